@@ -22,21 +22,19 @@ if TYPE_CHECKING:
     from ..runs.run import CalibrationRun
 
 
-#: What to do where nothing else is known.
-MEASURE_MORE = "measure more runs, then diagnose again"
-
-#: The same where the runs are planned.
+#: What to do where the runs are planned.
 PLANNED = "measure the planned runs (`diagnosis.plan()`)"
 
 
-def measure_more(runs: Sequence[CalibrationRun]) -> str:
-    """`MEASURE_MORE`, with the motion that these runs lack."""
-    if not runs:
-        return MEASURE_MORE
-    extent = extent_of(records_of(runs))
-    lacks = ["in both directions"] * (len(extent.directions) < 2)
-    lacks += ["at two speeds"] * (len(extent.speeds) < 2)
-    return MEASURE_MORE.replace("runs", f"runs, {' and '.join(lacks)}") if lacks else MEASURE_MORE
+def measure_more(runs: Sequence[CalibrationRun] = ()) -> str:
+    """What to do where nothing else is known, with the motion that these runs lack."""
+    lacks = []
+    if runs:
+        extent = extent_of(records_of(runs))
+        lacks += ["in both directions"] * (len(extent.directions) < 2)
+        lacks += ["at two speeds"] * (len(extent.speeds) < 2)
+    motion = f" {' and '.join(lacks)}" if lacks else ""
+    return f"measure more runs{motion}, then diagnose again"
 
 
 class Correctable(PlainResult):
@@ -160,7 +158,7 @@ class Correctable(PlainResult):
         """Raise where nothing was confirmed that a model can hold."""
         if self._is_correctable:
             return
-        steps = "; ".join(self.next_steps or [MEASURE_MORE])
+        steps = "; ".join(self.next_steps or [measure_more()])
         raise NoModelError(
             f"no correction can be given: no confirmed cause can be corrected; {steps}"
         )

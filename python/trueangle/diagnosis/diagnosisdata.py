@@ -19,7 +19,7 @@ from ..simulation.simulation import Simulation
 from ..support.layout import counted
 from ..support.plainresult import json_text, plain_fields
 from .beliefs import Belief
-from .correctable import MEASURE_MORE, PLANNED, Correctable, measure_more
+from .correctable import PLANNED, Correctable, measure_more
 from .discrepancy import Discrepancy
 from .factors.factor import Factor
 from .finding import Finding
@@ -193,7 +193,7 @@ class DiagnosisData(Correctable):
         steps += [f"{', '.join(questions)}: {measure}" for measure, questions in asked.items()]
         unexplained = self.unexplained is not None and self.unexplained.found
         doubtful = unexplained or len(sure) < len(self.findings)
-        if doubtful and not self.planned and MEASURE_MORE not in asked:
+        if doubtful and not self.planned and measure_more() not in asked:
             steps.append(measure_more(self.runs))
         return steps
 

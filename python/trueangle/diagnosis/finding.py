@@ -204,6 +204,9 @@ def named_quantity(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, st
     """Name and value of a parameter, an error in ``unit``."""
     shown, of = parameter_unit(name, unit)
     value, std = entry.value, entry.std
+    if name.startswith("row"):
+        # Files count rows from 0, texts readings from 1.
+        shown, value = name.replace("row", "reading"), _from_one(value)
     if name == "half_width_arcsec" and isinstance(value, float):
         full = of.number(2.0 * abs(value), None if std is None else 2.0 * std)
         return shown, f"{_number(abs(value), std, of)} (full width {full})"
@@ -212,6 +215,13 @@ def named_quantity(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, st
         text = ", ".join(_number(*item, of) for item in zip(value[:12], stds, strict=False))
         return shown, text + (f" and {len(value) - 12} more" if len(value) > 12 else "")
     return shown, _number(value, std, of)
+
+
+def _from_one(value: Any) -> Any:
+    """Places counted from 1, alone, in a list, or behind the label of a run."""
+    if isinstance(value, list):
+        return [*map(_from_one, value)]
+    return value + 1 if isinstance(value, int | float) else value
 
 
 def _number(value: Any, std: Any, of: ErrorUnit) -> str:

@@ -13,7 +13,7 @@ from ..estimation.regression import Regression
 from ..runs.checks.fault import DataFault
 from ..support.deadline import current_deadline
 from .confirmation import CONFIRMED, NOT_CONFIRMED, confirmation_status
-from .correctable import MEASURE_MORE
+from .correctable import measure_more
 from .finding import Finding
 from .formerrors import with_form_errors
 from .gain import Gain, measure_gain
@@ -89,17 +89,7 @@ def findings_of(
         if with_gain and gain is None and status == CONFIRMED:
             status, reason = NOT_CONFIRMED, NOT_HELD_OUT
         findings.append(
-            Finding(
-                cause,
-                parameters,
-                weight,
-                gain,
-                rivals,
-                effects,
-                status,
-                reason,
-                tuple(group),
-            )
+            Finding(cause, parameters, weight, gain, rivals, effects, status, reason, tuple(group))
         )
     beside = [_beside_doubts(regression, finding, exchanged) for finding in findings]
     changed = zip(findings, beside, strict=True)
@@ -194,5 +184,5 @@ def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambig
     because = "the error itself has no certain cause yet, so its scatter has none either"
     if fault is not None:
         because = f"{fault.fault}: the faulty readings cause the scatter"
-    measure = MEASURE_MORE if fault is None else f"{fault.mend}; then diagnose again"
+    measure = measure_more() if fault is None else f"{fault.mend}; then diagnose again"
     return Ambiguity((item.cause,), because, measure, True, item.bic_gain)

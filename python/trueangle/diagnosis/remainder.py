@@ -109,8 +109,8 @@ def aside_evidence(regression: Regression) -> Evidence | None:
         "put aside in a row",
         float(count),
         float(min(expected, 1.0) ** count / np.prod(np.arange(1.0, count + 1.0))),
-        f"{int(rows.sum())} outliers lie in {count} rows of {least} and more: something "
-        "that lasts, and no glitches",
+        f"{int(rows.sum())} outliers are in series of {least} or more consecutive readings: a "
+        "lasting error, not single glitches",
         rms=rms,
     )
 

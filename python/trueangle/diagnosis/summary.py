@@ -120,9 +120,7 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     yield from ((f"Fault of the data, {fault}.", 2, 0) for fault in diagnosis.data_faults)
     rest, unknown = diagnosis.unexplained, list[Entry]()
     if rest is not None and rest.found:
-        share = f"{100.0 * rest.share:.0f} % of the residual variance"
-        text = f"at least {unit.text(rest.rms)} rms ({share}) is not noise"
-        unknown = [(f"NOT UNDERSTOOD: {text} and has no known cause.", 2, 0)]
+        unknown = [(f"NOT UNDERSTOOD: {unit.text(rest.rms)} rms or more has no known cause.", 2, 0)]
         unknown += _items(rest.firing[:3], unit)
         before, after = (diagnosis.gain[f"rms_{when}_arcsec"] for when in ("before", "after"))
         if rest.rms**2 >= before**2 - after**2:  # what is larger than all that is found comes first

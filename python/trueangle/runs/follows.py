@@ -84,7 +84,7 @@ def check_follows(run: CalibrationRun) -> None:
 def unrelated_angles(records: list[Record]) -> Iterator[DataFault]:
     """Records whose two angles no fit takes."""
     for record in records:
-        for found in _unrelated(record.run, f" of run {record.label}"):
+        for found in _unrelated(record.run, f" of {record.name}"):
             yield record.fault("unrelated_angles", (), *found)
 
 
@@ -129,7 +129,7 @@ def check_usable(runs: Sequence[CalibrationRun]) -> None:
     if _are_plain(runs, strides):
         return
     records = [
-        replace(record, rows=np.arange(len(record)) * stride + 1)
+        replace(record, stride=stride)
         for record, stride in zip(records_of(map(_some_of, runs, strides)), strides, strict=True)
     ]
     _refuse(mixed_units(records))

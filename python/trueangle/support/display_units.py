@@ -153,6 +153,18 @@ def sine_of_rms(rms: float) -> float:
     return math.sqrt(2.0) * rms if math.isfinite(rms) else 0.0
 
 
+def rms_text(rms: float, period: float) -> str:
+    """An rms in the unit of ``period``, in the unit that suits it.
+
+    Examples
+    --------
+    >>> rms_text(0.01, 360.0)
+    '36.00 arcsec rms'
+    """
+    size = rms * (ARCSEC_PER_TURN / period)
+    return f"{error_unit('auto', sine_of_rms(size), period).text(size)} rms"
+
+
 def rounded_phase(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
     """A phase in [0, 360) deg and its standard deviation, to the digits that it leaves.
 

@@ -8,7 +8,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence, Sized
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import Final
 
@@ -55,15 +55,12 @@ def text_columns() -> int:
         # Nothing is folded.
         return 1_000_000
     # As `shutil.get_terminal_size` has it, whose import costs more than a small fit.
-    try:
+    found = 0
+    with suppress(ValueError):
         found = int(os.environ.get("COLUMNS", 0))
-    except ValueError:
-        found = 0
     if found <= 0:
-        try:
+        with suppress(AttributeError, ValueError, OSError):
             found = os.get_terminal_size(sys.__stdout__.fileno()).columns  # type: ignore[union-attr]
-        except (AttributeError, ValueError, OSError):
-            found = 0
     return min(max(found or _USUAL, _NARROWEST), _WIDEST)
 
 
@@ -160,3 +157,14 @@ def order_ranges(orders: Sequence[float]) -> str:
             run = []
         run.append(order)
     return ", ".join(parts)
+
+
+def run_name(label: str) -> str:
+    """What a text calls a run: ``run LABEL``, or the label where it begins with that word.
+
+    Examples
+    --------
+    >>> run_name("3"), run_name("Run 3")
+    ('run 3', 'Run 3')
+    """
+    return label if label.lower().startswith("run") else f"run {label}"

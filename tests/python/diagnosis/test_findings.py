@@ -98,7 +98,7 @@ def test_what_a_fault_of_the_data_scatters_is_no_property_of_the_sensor(seed: in
     ]
     for spot in told:
         assert spot.because.startswith("stale_samples")
-        assert "drop these rows" in spot.measure
+        assert "remove these readings" in spot.measure
 
 
 @pytest.mark.parametrize(("runs", "seed"), [(2, 4), (2, 6), (2, 8), (3, 1), (3, 3), (3, 8)])

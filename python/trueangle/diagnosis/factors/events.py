@@ -40,4 +40,5 @@ def step_events(signals: Signals, events: Sequence[tuple[int, int]]) -> Iterator
             scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
             if scale > 0.0:
                 own, count = partial(both, scale=scale, first=first), len(signals)
-                yield Group("run_time", columns / scale, (), at, own, "reading", count, (run, row))
+                event = signals.labels[run], row
+                yield Group("run_time", columns / scale, (), at, own, "reading", count, event)

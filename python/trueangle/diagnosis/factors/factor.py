@@ -9,7 +9,7 @@ from typing import Any
 from ...effects.curve import Curve
 from ...support.arrays import Array
 from ...support.display_units import ErrorUnit
-from ...support.layout import order_ranges
+from ...support.layout import order_ranges, run_name
 from ...support.plainresult import PlainResult, plain_fields
 from .group import PAIRS
 
@@ -20,7 +20,7 @@ WORDS = {
     "direction_place": "the place, changing with the direction",
     "reversal_time": "the time since the last reversal or stop",
     "run_time": "the time in the run",
-    "run": "the run (its zero)",
+    "run": "the zero of the run",
     "run_place": "the place, changing with the run",
     "speed": "the speed",
     "speed_place": "the place, changing with the speed",
@@ -95,8 +95,8 @@ class Factor(PlainResult):
         Its curves in a simulation; without parts that belong to one run only.
     jumps : tuple of (float, float)
         Where in a turn the function of the place jumps, degrees, and by how much, arcsec.
-    events : tuple of (int, int)
-        Runs and rows, from 0, at which something happened once.
+    events : tuple of (str, int)
+        Labels of runs and their readings, from 0, at which something happened once.
     fitted : ndarray or None
         Its function at the readings of the account, arcsec.
     """
@@ -114,7 +114,7 @@ class Factor(PlainResult):
     curve: FactorCurve = field(repr=False)
     effects: Sequence[Curve] = field(repr=False, default=())
     jumps: tuple[tuple[float, float], ...] = ()
-    events: tuple[tuple[int, int], ...] = ()
+    events: tuple[tuple[str, int], ...] = ()
     fitted: Array | None = field(repr=False, default=None)
 
     def to_dict(self) -> dict[str, Any]:
@@ -137,12 +137,11 @@ class Factor(PlainResult):
 
     @property
     def status(self) -> str:
-        """What is known of it without a name: whether anything corrects it."""
-        at_run_time = any(not effect.not_at_run_time for effect in self.effects)
-        simulated = (
-            "only the extended simulation contains" if self.effects else "no correction removes"
-        )
-        return f"Cause not determined; {'the correction removes' if at_run_time else simulated} it"
+        """What is known of it without a name: which files contain it."""
+        if any(not effect.not_at_run_time for effect in self.effects):
+            return "Cause not determined; the correction model contains it"
+        also = "but the extended simulation does" if self.effects else "nor the extended simulation"
+        return f"Cause not determined; the correction model does not contain it, {also}"
 
     def size(self, unit: ErrorUnit) -> str:
         """Where it is and how large, with its 95 % interval."""
@@ -153,8 +152,10 @@ class Factor(PlainResult):
             shown = ", ".join(each[:LISTED]) + " ..." * (len(each) > LISTED) + of.replace("_", " ")
             where.append(f"order{'s' * (len(self.orders) > 1)} {shown}")
         where += [f"a jump of {n(size)} {unit.name} at {at:.1f} deg" for at, size in self.jumps]
-        places = [f"run {run + 1} at row {row + 1}" for run, row in self.events]
-        where += [f"event{'s' * (len(places) > 1)} in {', '.join(places)}"] if places else []
+        for run in dict.fromkeys(run for run, _ in self.events):
+            rows = [f"{row + 1}" for label, row in self.events if label == run]
+            s = "s" * (len(rows) > 1)
+            where.append(f"event{s} at reading{s} {', '.join(rows)} of {run_name(run)}")
         range_ = f"95 %: {n(self.low)} to" if self.low else "at most"
         return ", ".join([*where, f"{n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"])
 

@@ -97,7 +97,7 @@ class Group:
     function: Basis | None
     unit: str
     alternatives: float = 1.0
-    event: tuple[int, int] | None = None
+    event: tuple[str, int] | None = None
     jump: float | None = None
 
     @cached_property

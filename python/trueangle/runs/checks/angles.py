@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...support.angles import wrap
 from ...support.arrays import Array, median, quantile
+from ...support.layout import counted
 from ...support.roles import turned_code
 from .fault import DataFault
 from .record import Record
@@ -210,12 +211,12 @@ def _rows_in_other_units(record: Record, role: str) -> Iterator[DataFault]:
     for unit, factor in OTHER_UNITS.items():
         other = _in_unit(angle, factor, limit)
         if _are_others(other, np.where(other, factor, 1.0) * angle, limit):
-            rows = record.rows[other]
+            rows = np.flatnonzero(other)
             yield record.fault(
                 "mixed_units",
-                rows.tolist(),
-                f"the {role} angle of run {record.label} looks like {unit} among degrees in "
-                f"{rows.size} rows (first: row {rows[0]})",
+                rows,
+                f"the {role} angle of {record.name} looks like {unit} among degrees in "
+                f"{counted(rows, 'reading')} (first: {record.number(rows[0])})",
                 "convert them, or give them another file",
             )
             return
@@ -285,8 +286,8 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
         period = float(median(np.abs(reference - ahead)[jumps]))
         yield record.fault(
             "wrapped_reference",
-            record.rows[jumps + 1].tolist(),
-            f"the reference of run {record.label} wraps after {period:.4g} deg, which is not "
+            jumps + 1,
+            f"the reference of {record.name} wraps after {period:.4g} deg, which is not "
             "a turn: one number means several places",
             "log the reference over a whole turn, or unwrap it before",
         )

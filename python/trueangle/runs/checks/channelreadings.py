@@ -151,8 +151,8 @@ def dropout_words(count: int, first: int) -> tuple[str, str]:
     is_one = count == 1
     return (
         f"{counted(count, 'reading')} of the channels {'is' if is_one else 'are'} off "
-        f"{'the' if is_one else 'their'} curve (dropout), {'in' if is_one else 'the first in'} row "
-        f"{first}",
+        f"{'the' if is_one else 'their'} curve (dropout), {'at' if is_one else 'the first at'} "
+        f"reading {first}",
         "check the wire and the converter",
     )
 

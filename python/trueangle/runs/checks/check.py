@@ -12,12 +12,7 @@ from ...support.argumentkinds import told_kinds
 from ..follows import unrelated_angles
 from ..run import runs_or_data
 from ..source import ReadingOptions
-from .angles import (
-    UNUSABLE_ANGLES,
-    mixed_units,
-    swapped_channels,
-    told_ratio,
-)
+from .angles import UNUSABLE_ANGLES, mixed_units, swapped_channels, told_ratio
 from .fault import UNUSABLE, DataFault
 from .record import Record, read_records, records_of
 from .rows import duplicate_rows, duplicate_runs, missed_counts, outliers
@@ -112,11 +107,11 @@ def unsorted_time(records: list[Record]) -> Iterator[DataFault]:
             k = int(back[0])
             yield record.fault(
                 "unsorted_time",
-                record.rows[back].tolist(),
-                f"time runs backwards in run {record.label}, {back.size} time"
-                f"{'s' * (back.size > 1)} (first in row {record.rows[k]}: "
+                back,
+                f"time runs backwards in {record.name}, {back.size} time"
+                f"{'s' * (back.size > 1)} (first at reading {k + 1}: "
                 f"{record.time[k]:g} s after {record.time[k - 1]:g} s)",
-                "sort the rows by time, or give what follows another run label",
+                "sort the readings by time, or give those after it another run label",
             )
 
 

@@ -29,7 +29,7 @@ REPEATS = ("duplicate_runs", "duplicate_rows", "unsorted_time")
 
 
 class DataFault(NamedTuple):
-    """What is wrong with rows or runs, before any model.
+    """What is wrong with readings or runs, before any model.
 
     Attributes
     ----------
@@ -42,8 +42,7 @@ class DataFault(NamedTuple):
     runs : tuple of str
         Labels of the runs that have it.
     rows : tuple of int
-        Rows, counted from 1 within each file (the header not counted) or within the run
-        where there is no file; empty where whole runs are meant.
+        Readings, counted from 1 within their run; empty where whole runs are meant.
     says : str
     mend : str
         What to do.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...support.angles import unwrapped, wrap
 from ...support.arrays import Array
+from ...support.layout import run_name
 from ...support.roles import offsets_of, unit_in_name
 from ...support.signals import FIELDS
 from ..files import read_columns
@@ -43,8 +44,6 @@ class Record:
     label : str
     reference, indicated : ndarray, shape (n,)
         Degrees, as they were read.
-    rows : ndarray of int
-        Row of each reading in its file, from 1.
     time, velocity, temperature, torque, mount : ndarray or None
         s, deg/s, Celsius, Nm, degrees.
     columns : mapping of role to (name, unit)
@@ -55,12 +54,13 @@ class Record:
         Columns of no role that are called like a time, where none was understood.
     channels : RecordedChannels or None
         Of the first run of a file: the channels of all its runs.
+    stride : int
+        Every so many readings of the run are in it.
     """
 
     label: str
     reference: Array
     indicated: Array
-    rows: NDArray[np.int64]
     time: Array | None = None
     velocity: Array | None = None
     temperature: Array | None = None
@@ -70,9 +70,15 @@ class Record:
     deviations: tuple[str, ...] = ()
     clocks: tuple[str, ...] = ()
     channels: RecordedChannels | None = None
+    stride: int = 1
 
     def __len__(self) -> int:
         return int(self.reference.size)
+
+    @property
+    def name(self) -> str:
+        """What texts call it."""
+        return run_name(self.label)
 
     @cached_property
     def unwrapped(self) -> tuple[Array, Array]:
@@ -86,9 +92,13 @@ class Record:
             indicated[alone] = self.reference[alone] + error[alone - 1]
         return unwrapped(self.reference, 360.0), unwrapped(indicated, 360.0)
 
-    def fault(self, fault: str, rows: Sequence[int], says: str, mend: str) -> DataFault:
-        """A fault of it."""
-        return DataFault.of(fault, [self.label], rows, says, mend)
+    def fault(self, fault: str, at: Iterable[int], says: str, mend: str) -> DataFault:
+        """A fault of it, in its readings ``at``, from 0."""
+        return DataFault.of(fault, [self.label], [self.number(k) for k in at], says, mend)
+
+    def number(self, at: int) -> int:
+        """Of a reading in its run, from 1."""
+        return self.stride * at + 1
 
     @cached_property
     def run(self) -> CalibrationRun:
@@ -121,7 +131,6 @@ def _record(
         label,
         of.reference[rows] * scale,
         of.indicated[rows] * scale,
-        np.arange(1, of.reference.size + 1)[rows],
         **{
             name: values[rows] * (scale if name in ("velocity", "mount") else 1.0)
             for name, values in signals.items()

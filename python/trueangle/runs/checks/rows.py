@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from ...support.angles import wrap
 from ...support.arrays import Array, distinct, median, quantile
 from ...support.display_units import brief_number
+from ...support.layout import counted
 from ..outliers import WILD, robust_scale, spikes
 from ..run import CalibrationRun
 from .fault import REPEATS, DataFault
@@ -42,8 +42,8 @@ def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
     """
     for record in records:
         apart = 1 + len(record) // _LOOKED_AT
-        names = ("reference", "indicated", "rows")
-        some = replace(record, **{name: getattr(record, name)[::apart] for name in names})
+        angles = record.reference[::apart], record.indicated[::apart]
+        some = Record(record.label, *angles)
         reference, indicated = some.unwrapped
         error = some.run.centred_error
         # By their rows, with their sizes and what a pattern may change by meanwhile.
@@ -65,10 +65,10 @@ def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
             k = rows.start + _largest((record.indicated - record.reference)[rows], lost)
             yield record.fault(
                 "missed_counts",
-                [int(record.rows[k])],
-                f"the error of run {record.label} jumps by {brief_number(lost)} deg at row "
-                f"{record.rows[k]} and stays there: steps or counts were lost",
-                "give the rows from there another run label, or measure again",
+                [k],
+                f"the error of {record.name} jumps by {brief_number(lost)} deg at reading "
+                f"{k + 1} and stays there: steps or counts were lost",
+                "give the readings from there another run label, or measure again",
             )
 
 
@@ -80,12 +80,12 @@ def parted(runs: Sequence[CalibrationRun]) -> tuple[list[CalibrationRun], list[s
     parts, told = [], []
     for run, record in zip(runs, records_of(runs), strict=True):
         faults = list(missed_counts([record]))
-        told += [f"{f.says}; the readings from there have a zero of their own" for f in faults]
+        told += [f"{f.says}; the readings from there have a separate zero" for f in faults]
         starts = [fault.rows[0] - 1 for fault in faults]
         parts.append(run.part(slice(starts[0])) if faults else run)
         for a, b in pairwise([*starts, len(run)]):
             parts.append(
-                run.part(slice(a, b), label=f"{record.label} from row {a + 1}", left_out=0)
+                run.part(slice(a, b), label=f"{record.label} from reading {a + 1}", left_out=0)
             )
     return parts, told
 
@@ -169,16 +169,16 @@ def outliers(records: Iterable[Record], faults: Iterable[DataFault]) -> Iterator
         if record.label in unsure or len(record) < 2:
             continue
         far, distance = _isolated(record)
-        rows = record.rows[far]
+        rows = np.flatnonzero(far)
         if rows.size:
             most = int(np.argmax(np.where(far, distance, 0.0)))
             yield record.fault(
                 "outliers",
-                rows.tolist(),
-                f"{rows.size} reading{'s' * (rows.size > 1)} of run {record.label} "
-                f"{'are' if rows.size > 1 else 'is'} far off the neighbours in angle: row "
-                f"{record.rows[most]} by {brief_number(float(distance[most]))} deg",
-                "check the rows; `fit` and `diagnose` reject them",
+                rows,
+                f"{counted(rows, 'reading')} of {record.name} "
+                f"{'are' if rows.size > 1 else 'is'} far off the neighbours in angle: reading "
+                f"{most + 1} by {brief_number(float(distance[most]))} deg",
+                "check these readings; `fit` and `diagnose` reject them",
             )
 
 
@@ -229,20 +229,20 @@ def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
         order = np.lexsort(table)
         same = np.diff(table[:, order]) == 0.0
         again = same.all(axis=0)
-        rows = np.sort(record.rows[order[1:][again]])
+        rows = np.sort(order[1:][again])
         if record.time is not None and rows.size:
             yield record.fault(
                 "duplicate_rows",
-                rows.tolist(),
-                f"{rows.size} row{'s' * (rows.size > 1)} of run {record.label} (first: row "
-                f"{rows[0]}) are there twice, time stamp and readings",
+                rows,
+                f"{record.name} has {counted(rows, 'reading')} twice, with the same time stamp "
+                f"(first: {rows[0] + 1})",
                 "drop the second of each",
             )
         elif rows.size >= LEAST_READINGS and np.array_equal(again, same[-1]):
             yield record.fault(
                 "duplicate_rows",
-                rows.tolist(),
-                f"{rows.size} of {len(record)} readings of run {record.label} repeat others to "
-                f"the last digit (first: row {rows[0]}): uncertainties would come out too small",
+                rows,
+                f"{rows.size} of {len(record)} readings of {record.name} repeat others to the last "
+                f"digit (first: {rows[0] + 1}): uncertainties would come out too small",
                 "drop the copies",
             )

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...support.arrays import Array, median, quantile
+from ...support.layout import counted
 from .fault import DataFault
 from .record import Record
 
@@ -111,25 +112,23 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
             stale += range(a + 1, b + 1)
             times += 1
     if limit:
-        rows = record.rows[np.array(limit)]
         value = float(own[limit[0]])
         yield record.fault(
             "saturated_travel",
-            rows.tolist(),
-            f"the {name} angle of run {record.label} stays at {value:g} deg, the end of its "
-            f"range, in {rows.size} rows (first: row {rows[0]}) while the joint moves on",
-            "leave these rows out, or measure inside the range",
+            limit,
+            f"the {name} angle of {record.name} stays at {value:g} deg, the end of its range, in "
+            f"{counted(limit, 'reading')} (first: {limit[0] + 1}) while the joint moves on",
+            "remove these readings, or measure inside the range",
         )
     # Rows from which on stale readings are a fault of the data and no coincidence, where they come
     # more than once; at one place a command that is held would do.
     if len(stale) >= (3 if times > 1 else _HELD):
-        rows = record.rows[np.array(stale)]
         yield record.fault(
             "stale_samples",
-            rows.tolist(),
-            f"{rows.size} {name} readings of run {record.label} (first: row {rows[0]}) repeat "
-            "the one before while the joint moves: old samples were logged again",
-            "drop these rows, or log each sample once with its own time stamp",
+            stale,
+            f"the {name} angle of {record.name} does not change in {counted(stale, 'reading')} "
+            f"(first: {stale[0] + 1}) while the joint moves: the log repeats old samples",
+            "remove these readings, or log each sample once, with its own time stamp",
         )
 
 

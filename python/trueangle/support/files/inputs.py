@@ -98,8 +98,7 @@ def read_whole(path: str | PathLike[str], limit: int, what: str) -> bytes:
         raise FileError(path, "is a folder; name a file in it")
     if found.st_size > limit:
         raise FileError(
-            path,
-            f"has {found.st_size} bytes, but {what} is read up to {_size(limit)} only",
+            path, f"has {found.st_size} bytes, but {what} is read up to {_size(limit)} only"
         )
     parts, total = [], 0
     with open(path, "rb", buffering=0) as file:
@@ -112,8 +111,7 @@ def read_whole(path: str | PathLike[str], limit: int, what: str) -> bytes:
             wanted = _CHUNK
             if total > limit:
                 raise FileError(
-                    path,
-                    f"is longer than {_size(limit)}, the most that is read of {what}",
+                    path, f"is longer than {_size(limit)}, the most that is read of {what}"
                 )
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
@@ -220,9 +218,7 @@ def same_file(first: str | PathLike[str], second: str | PathLike[str]) -> bool:
 
 
 def named_again(
-    output: str | PathLike[str],
-    inputs: Iterable[str | PathLike[str]],
-    endings: Iterable[str],
+    output: str | PathLike[str], inputs: Iterable[str | PathLike[str]], endings: Iterable[str]
 ) -> str | None:
     """The input that ``output`` is, or None.
 

