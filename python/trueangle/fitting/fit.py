@@ -333,17 +333,10 @@ def fitted_to(
     if taken is not None:
         remarks += taken.sentences(problem.period)
     if len(found) > 1:
-        from .unlikeruns import (
-            run_names,
-            unlike_runs,
-            unlike_runs_sentence,
-            zeros_follow_speed,
-            zeros_follow_speed_sentence,
-        )
+        from .unlikeruns import run_names, unlike_runs, unlike_runs_sentence, zeros_follow_speed
 
         if summed is None:
-            following = zeros_follow_speed(found, fitted.offsets, fitted.solution.offset_std)
-            remarks += [zeros_follow_speed_sentence(*following)] if following else []
+            remarks += zeros_follow_speed(found, fitted.offsets, fitted.solution.offset_std)
         unlike = unlike_runs(problem, fitted)
         if unlike:
             names = run_names(found)

@@ -175,14 +175,7 @@ class Problem:
             raise ArgumentError("every reading has weight 0: nothing is left to fit")
         ridge = self._penalties(weights, penalty) if penalty > 0.0 else None
         solution = _core.fit(
-            rows,
-            self.period,
-            *self.design,
-            self.argument,
-            self.method,
-            ridge,
-            self.threads,
-            watch,
+            rows, self.period, *self.design, self.argument, self.method, ridge, self.threads, watch
         )
         offsets = solution.offsets
         if len(rows) < len(self.runs):

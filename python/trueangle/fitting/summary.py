@@ -40,7 +40,7 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     lines.append(f"{counted(model.orders, 'order')} fitted: error {sizes}.")
     if not freedom:
         lines.append("No reading tests it: as many unknowns as readings; read at more positions.")
-    lines += [*(note for note in fit.notes if note.startswith("One sweep ")), ""]
+    lines += [*(note for note in fit.notes if note.startswith("Not corrected: ")), ""]
     if model.shafts or model.channels is None:
         lines += [*_table(fit, shown), ""]
     if model.channels is not None:

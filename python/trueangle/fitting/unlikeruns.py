@@ -158,10 +158,8 @@ def _correlated(problem: Problem, index: int) -> float:
     return float(np.mean(CorrelatedNoise.of([columns], [left], scale).widening([columns]) ** 2))
 
 
-def zeros_follow_speed(
-    runs: Sequence[CalibrationRun], zeros: Array, std: Array
-) -> tuple[float, float] | None:
-    """Delay (s) of the zeros behind the mean speeds of the runs, and its p-value.
+def zeros_follow_speed(runs: Sequence[CalibrationRun], zeros: Array, std: Array) -> list[str]:
+    """A sentence where the zeros follow the mean speeds of the runs, as with a delay τ.
 
     ::
 
@@ -174,25 +172,22 @@ def zeros_follow_speed(
     timed = np.isfinite(means) & np.isfinite(zeros)
     # Runs from which on a line through their zeros can fail.
     if timed.sum() < 3:
-        return None
+        return []
     speed, period = means[timed], runs[0].period
     zero = wrap(zeros[timed] - circular_mean(zeros[timed], period), period)
     speed, zero = speed - speed.mean(), zero - zero.mean()
     energy, freedom = float(speed @ speed), int(timed.sum()) - 2
     if energy == 0.0:
-        return None
+        return []
     slope = float(speed @ zero) / energy
     rest = zero - slope * speed
     noise = max(float(rest @ rest) / freedom, float(np.nanmean(std[timed] ** 2)), 1e-300)
     chance = f_tail(slope**2 * energy / noise, 1.0, float(freedom))
     # Probability below which zeros that do not follow the speed would do so.
-    return (-slope, chance) if chance < 1e-3 else None
-
-
-def zeros_follow_speed_sentence(delay: float, chance: float) -> str:
-    """A sentence on zeros that follow the speed."""
-    return (
-        f"the zeros of the runs follow their speed, as with a delay of {brief_number(1e3 * delay)} "
-        f"ms (p = {chance:.1g}): the model corrects only their mean. Run diagnose, which separates "
-        "a delay from a reversal error"
-    )
+    if chance >= 1e-3:
+        return []
+    return [
+        "the zeros of the runs follow their speed, as with a delay of "
+        f"{brief_number(-1e3 * slope)} ms (p = {chance:.1g}): the model corrects only their mean. "
+        "Run diagnose, which separates a delay from a reversal error"
+    ]

@@ -155,7 +155,7 @@ def test_one_sweep_states_what_it_took_as_drift() -> None:
                      for x, e in ((theta, error[0]), (theta[::-1], error[1, ::-1]))])  # fmt: skip
     (one, back), (rough, _) = runs
     found, both = ta.fit(one), ta.fit([one, back])
-    (note,) = [note for note in found.notes if note.startswith("One sweep cannot distinguish")]
+    (note,) = [note for note in found.notes if "taken as drift: one sweep" in note]
     assert note.startswith(found.summary().splitlines()[1])
     (size,) = re.findall(r": (\S+) arcsec rms was taken", note)
     assert 0.5 < float(size) / (3600.0 * found.residual_std) < 1.0
@@ -163,7 +163,7 @@ def test_one_sweep_states_what_it_took_as_drift() -> None:
     for digits in (12, 4, 3):
         error = 0.9 * np.sin(np.radians(3.0 * theta))
         bare = ta.CalibrationRun(theta, np.round(theta + error, digits), 360.0)
-        assert not any("One sweep" in note for note in ta.fit(bare).notes), digits
-    assert not any("One sweep" in note for note in both.notes)
-    with pytest.raises(ta.errors.NoOrderError, match="one sweep cannot distinguish"):
+        assert not any("one sweep" in note for note in ta.fit(bare).notes), digits
+    assert not any("one sweep" in note for note in both.notes)
+    with pytest.raises(ta.errors.NoOrderError, match="one sweep cannot"):
         ta.fit(rough)

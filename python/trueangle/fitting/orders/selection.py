@@ -350,10 +350,9 @@ class EvidenceSelection:
         plan = f"run: `ta.plan_arc(0, 360, readings={FEW})`"
         if not rows:
             read = f"{counted(self.samples, 'reading')} at {counted(self.positions, 'position')}"
-            what = "readings" if self.samples <= len(self.units) + 2 else "positions"
             return (
-                f"too few {what}: {read}; {counted(self.units, 'zero')} and one order need "
-                f"{len(self.units) + 3} readings, a choice among orders {FEW}; {plan}"
+                f"{read} are too few: 1 order and {counted(self.units, 'zero')} need "
+                f"{len(self.units) + 3} readings, a search for orders needs {FEW}; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
         count = len(self.orders)

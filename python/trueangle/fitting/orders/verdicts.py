@@ -28,7 +28,7 @@ from ...runs.aliasing import (
 from ...runs.run import CalibrationRun, as_runs
 from ...runs.travel import is_swept_once
 from ...support.angles import arcsec
-from ...support.display_units import brief_number, error_unit, sine_of_rms
+from ...support.display_units import brief_number, rms_text
 from .candidates import Candidates, choose_candidates
 from .result import OrderSelection
 from .table import OrderRow
@@ -149,13 +149,9 @@ def drift_of_a_sweep(runs: Sequence[CalibrationRun], estimate: EvidenceEstimate)
     taken = float(np.var(np.concatenate([part - part.mean() for part in left]))) - noise
     if taken <= max(noise, 1e-12 * float(np.var(error))):
         return []
-    drift = math.sqrt(taken)
-    period = runs[0].period
-    size = arcsec(drift, period)
-    text = error_unit("auto", sine_of_rms(size), period).text(size)
     return [
-        f"one sweep cannot distinguish drift from a function of the angle: {text} rms was "
-        "taken as drift and is not corrected; sweep back as well, and fit both runs"
+        f"not corrected: {rms_text(math.sqrt(taken), runs[0].period)}, taken as drift: one sweep "
+        "cannot distinguish it from a function of the angle; sweep back as well, and fit both runs"
     ]
 
 
@@ -288,7 +284,7 @@ def _between(positions: Positions, candidates: Candidates) -> bool:
 
 
 def _sentence(positions: Positions, candidates: Candidates) -> str:
-    where = f"verified at {positions.describe()}"
+    where = positions.describe()
     if _between(positions, candidates):
-        return f"{where}, and between them if there are no higher orders than these distinguish"
-    return f"{where} only, not between them: there a higher order would look like one of these"
+        return f"verified at {where}, and between them for the orders that they resolve"
+    return f"verified only at {where}: a higher order may add error between them, not measured"
