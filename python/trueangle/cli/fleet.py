@@ -77,10 +77,7 @@ def requested_fleet(args: argparse.Namespace, **limits: Any) -> Fleet:
 def run(args: argparse.Namespace) -> int:
     """Judge the units, save, print."""
     found = requested_fleet(
-        args,
-        share=args.share,
-        confidence=args.confidence,
-        permitted_arcsec=args.permitted_arcsec,
+        args, share=args.share, confidence=args.confidence, permitted_arcsec=args.permitted_arcsec
     )
     if args.output is not None:
         found.save(args.output)

@@ -241,7 +241,9 @@ def _run_after(args: argparse.Namespace) -> int:
     from .run_lists import read_selected_runs
 
     if args.simulation is None:
-        raise ArgumentError("--after needs the assumed joint: add --simulation FILE")
+        raise ArgumentError(
+            "--after needs the assumed joint: --simulation FILE, as diagnose --extend writes"
+        )
     refuse_given(args, _OF_OTHERS, "does not go with --after; leave one of them out")
     args.runs = args.after
     plan = plan_after(

@@ -50,11 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "laboratory and the type B uncertainties",
     )
     add("--positions N", int, "nominal positions of a certificate (default: 36)")
-    add(
-        "--fleet",
-        bool,
-        "compare the units with each other, as trueangle fleet does, on one page",
-    )
+    add("--fleet", bool, "compare the units with each other, as trueangle fleet does, on one page")
     add(
         "--by",
         ("unit", "run"),

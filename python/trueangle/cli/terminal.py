@@ -59,10 +59,7 @@ class PlainStream:
     """
 
     def __init__(
-        self,
-        stream: TextIO,
-        name: str = STANDARD_OUTPUT,
-        wording: Callable[[str], str] = str,
+        self, stream: TextIO, name: str = STANDARD_OUTPUT, wording: Callable[[str], str] = str
     ) -> None:
         self.steering = stream
         self._name = name

@@ -152,7 +152,7 @@ def _judged_fleet(
     chosen = shared_pattern(units)
     if n < FEWEST:
         those = "One unit is" if n == 1 else f"{n} units are"
-        notes.append(f"{those} too few to find outliers: {FEWEST} are needed.")
+        notes.append(f"{those} too few for outliers or a common pattern: {FEWEST} are needed.")
     again = [dates for dates in units.dated if len(dates) > 1]
     spread = np.array([one.variance for one in chosen.between])
     changes = {

@@ -265,7 +265,7 @@ def _fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
 
 
 def _orders(fleet: Fleet, shown: ErrorUnit, scale: float) -> list[str]:
-    shared = "the mean of the units" if fleet.aligned else "none: the units share no direction"
+    shared = "the mean of the units" if fleet.aligned else "none: the phases of units differ"
     lines = [f"  common pattern: {shared}", "   order      common  between units  repeatability"]
     for common, between in zip(fleet.common, fleet.between, strict=True):
         again = (
@@ -275,7 +275,7 @@ def _orders(fleet: Fleet, shown: ErrorUnit, scale: float) -> list[str]:
             f"  {common.order:6g}  {shown.number(scale * common.amplitude):>10}  "
             f"{shown.number(scale * between.std):>13}  {again:>13}"
         )
-    return [*lines, f"  (standard deviations of cosine and sine, {shown.name})"]
+    return [*lines, f"  (amplitude; then standard deviations of cosine and sine, {shown.name})"]
 
 
 def _tolerance(fleet: Fleet, shown: ErrorUnit, scale: float) -> str:

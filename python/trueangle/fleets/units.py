@@ -97,7 +97,7 @@ def shared_pattern(units: Units) -> SharedPattern:
     n = len(units.last)
     # The residual has the share of an order that shows no damage.
     shares = level_by_order(np.append(units.orders, 0.0))
-    choices = (False, True) if n > 2 else (False,)
+    choices = (False, True) if n > 1 else (False,)
     values, own = [*units.values, units.log_left], [*units.own, units.log_left_own]
     found = {aligned: deviates(values, own, aligned, shares=shares) for aligned in choices}
     judged = ~np.any([one.outlying for one in found.values()], axis=0)

@@ -115,12 +115,14 @@ def plan_arc(
     per_step = runs * (2 if both_directions else 1)
     if runs < 1 or runs != int(runs):
         raise ArgumentError(f"runs must be a whole number of at least 1, got {runs!r}")
+    # One more reading than unknowns, so that a fit has a residual.
+    least = max(columns.count * per_step, runs + columns.count)
     total = _readings(columns, best, readings, noise, standard_error, uncertainty)
-    steps = max(math.ceil(total / per_step), 1)
-    if steps < columns.count:
+    total = total if readings is not None else max(total, least)
+    steps = math.ceil(total / per_step)
+    if steps * per_step < least:
         raise ArgumentError(
-            f"readings must be at least {columns.count * per_step} for {len(wanted)} orders and a "
-            f"zero in {counted(runs, 'run')}, got {total}"
+            f"readings must be at least {least} for {counted(wanted, 'order')}, got {total}"
         )
     while True:
         turns = _spread(_places(columns, best, steps), apart / 360.0, columns)

@@ -84,6 +84,7 @@ class ArcPlan(PlainResult):
             *place_table(self.places_deg, self.counts),
             f"  D-efficiency           {self.d_efficiency:.3f} of the best possible",
             f"  of even spacing        {self.efficiency_of_even_spacing:.3f}",
+            f"  fit with               --orders {','.join(f'{k:g}' for k in self.orders)}",
             _FACTOR,
             "  order  these places  even spacing",
         ]
@@ -172,26 +173,23 @@ class CalibrationPlan(PlainResult):
 
     def summary(self) -> str:
         """The plan as text."""
-        offsets = ", ".join(f"{o:.4g}" for o in self.mount_offsets_deg)
+        offsets = [f"{o:.4g}" for o in self.mount_offsets_deg]
         if self.kind == "encoder":
             lines = [
                 f"{self.readings or self.positions} readings at {self.positions} jittered "
-                f"positions of a free reference encoder, clamped at {offsets} deg in turn"
+                f"positions of a free reference encoder, clamped at {', '.join(offsets)} deg"
             ]
         else:
-            each = self.positions * len(self.mount_offsets_deg)
+            each = self.positions * len(offsets)
             rounds = "" if self.readings is None else f", {self.readings // each} times each"
             total = f"{self.readings or each} readings in all{rounds}"
-            mounts = counted(self.mount_offsets_deg, self.kind.removesuffix("s"))
-            lines = [
-                f"{mounts} of {self.positions} positions, offset by {offsets} deg: {total}",
-                f"  tolerance              {self.tolerance_deg:.2g} deg for each offset; record "
-                "it to 0.01 deg",
-            ]
+            one = self.kind.removesuffix("s")
+            lines = [f"{counted(offsets, one)} of {self.positions} positions: {total}"]
+            for k, (at, turned) in enumerate(zip(offsets, self.facet_shifts, strict=True), 1):
+                lines.append(f"  {one} {k}: from {at} deg on, reference turned by {turned} faces")
+            tolerance = f"{self.tolerance_deg:.2g} deg for the first position; record 0.01 deg"
+            lines.append(f"  tolerance              {tolerance}")
         lines += [f"  note: {note}" for note in self.notes]
-        if self.kind == "mounts":
-            shifts = ", ".join(str(s) for s in self.facet_shifts)
-            lines.append(f"  turn the reference by  {shifts} faces at the mounts in this order")
         lines.append(_worst(self.worst_noise_factor))
         if math.isfinite(self.facet_noise_factor):
             # The attribute is relative to one mount, the ideal to as many readings.

@@ -166,7 +166,7 @@ def test_words_of_a_fleet_are_those_of_its_numbers(fleet):
     text = replace(fleet, notes=("first", "second"), aligned=True).summary()
     assert "  [1] first\n  [2] second" in text
     assert "common pattern: the mean of the units" in text
-    assert "none: the units share no direction" in replace(fleet, aligned=False).summary()
+    assert "none: the phases of units differ" in replace(fleet, aligned=False).summary()
     (due,) = [row for row in fleet.history if row.next_calibration and not row.extrapolated]
     assert f"at most until {due.when[:10]}" in " ".join(text.split())
     # The unit of all is that of the largest.
@@ -177,7 +177,7 @@ def test_words_of_a_fleet_are_those_of_its_numbers(fleet):
 
 
 def unit_told(fleet):
-    return fleet.summary().split("(standard deviations of cosine and sine, ")[1].split(")")[0]
+    return fleet.summary().split("standard deviations of cosine and sine, ")[1].split(")")[0]
 
 
 LEVELS_SEED = 52_080

@@ -217,7 +217,7 @@ def test_even_places_that_do_not_tell_the_orders_are_no_end_of_a_plan():
         ({"start": 10.0, "stop": 10.0}, "an arc runs from"),
         ({"start": 0.0, "stop": 400.0}, "at most 360 deg"),
         ({"start": 0.0, "stop": 90.0, "orders": [1, 1]}, "each named once"),
-        ({"start": 0.0, "stop": 270.0, "readings": 5}, "readings must be at least 9"),
+        ({"start": 0.0, "stop": 270.0, "readings": 5}, "readings must be at least 10"),
         ({"start": 0.0, "stop": 270.0, "uncertainty": 2.0}, "give `noise=`"),
         (
             {"start": 0.0, "stop": 270.0, "uncertainty": -2.0, "noise": 1.0},
