@@ -260,9 +260,7 @@ def _columns(theta: Array, orders: Sequence[float]) -> Array:
 
 
 def estimate_by_evidence(
-    runs: Sequence[RunReadings],
-    orders: Sequence[float],
-    probability: Sequence[float] | None = None,
+    runs: Sequence[RunReadings], orders: Sequence[float], probability: Sequence[float] | None = None
 ) -> EvidenceEstimate:
     """Estimate orders, their coefficients and the noise of runs together.
 

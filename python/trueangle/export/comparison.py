@@ -275,8 +275,8 @@ class Comparison(PlainResult):
                 use = "Which is right now: trueangle watch READINGS -m A, then B."
         known = f"Standard error over the turn: {unit.text(a)} rms of A, {unit.text(b)} of B."
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
-        p = f"p {p}: as much by noise alone; below {self.false_alarms:g} it is a change."
-        return [first, f"{use} {known}", p]
+        p = f"p {p}: probability of such a difference if only noise differs; a change is reported"
+        return [first, f"{use} {known}", f"{p} below {self.false_alarms:g}."]
 
     def _moved(self, unit: ErrorUnit) -> list[str]:
         """The orders that differ by more than three standard errors, the clearest first."""

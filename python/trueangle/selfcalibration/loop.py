@@ -49,8 +49,8 @@ def followed_orders(
             tuple(orders),
             f"encoder or loop: {how}; a loop closed on this encoder moves the shaft by its error, "
             "and the log shows only the residual",
-            'coast down with the drive off or turn by an open-loop field (`loop="open"`), or '
-            'state the loop\'s bandwidth (`loop="closed", loop_bandwidth=HZ`)',
+            'if the drive was off or ran open loop, give `loop="open"`; if a loop held the speed, '
+            'give its bandwidth (`loop="closed", loop_bandwidth=HZ`)',
         )
     refused = tuple(k for k in orders if k * slowest < FOLLOWS_BELOW * bandwidth)
     if not refused:

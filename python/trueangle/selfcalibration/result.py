@@ -238,13 +238,13 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     largest = max(filter(math.isfinite, sizes), default=0.0)
     unit = error_unit(errors_in, largest, result.model.period)
     rms = math.sqrt(0.5) * math.hypot(*(o.amplitude for o in result.orders))
-    answer = "" if result.channels else "NO CORRECTION: no order is the encoder's alone; "
+    answer = "" if result.channels else "NO CORRECTION: no order is due to the encoder alone; "
     answer = f"Encoder error {unit.text(rms)} rms; " if result.orders else answer
     # A part that another one predicts is reason enough: the notes allow for the others.
     failed = [] if any(t.agrees for t in result.held_out.values()) else [*result.held_out.values()]
     lines = [
         *(f"NOT CONFIRMED: {t.judged_on} disagrees with {t.fitted_on}." for t in failed[:1]),
-        f"{answer}calibrated without a reference ({result.method}): {result.readings} readings, "
+        f"{answer}{result.method} without a reference: {result.readings} readings, "
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
     if not result.orders and result.channels is None:
@@ -256,11 +256,11 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     if result.orders:
         lines += ["", *_table(result.orders, unit)]
     if result.sums:
-        lines += ["", "not the encoder's alone:", *_table(result.sums, unit)]
-    lines += ["", "cannot be identified"]
+        lines += ["", "due to the encoder and another source:", *_table(result.sums, unit)]
+    lines += ["", "not identifiable"]
     for blind in result.blind:
         lines += wrapped_lines(unit.spoken(f"{blind_words(blind.orders)}: {blind.because}"), 4, 2)
-        lines += wrapped_lines(f"to see it: {blind.measure}", 6, 4)
+        lines += wrapped_lines(f"remedy: {blind.measure}", 6, 4)
     if result.held_out:
         lines += ["", "held out"]
         for test in result.held_out.values():
@@ -291,7 +291,7 @@ def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
     names = {o.of for o in orders} != {"the encoder"}
     lines = [
         f"   order  {f'amplitude/{unit.name}':>16}      +-  phase/deg  retained  factor"
-        + ("  of" if names else "")
+        + ("  source" if names else "")
     ]
     for o in orders:
         size, std = unit.pair(o.amplitude, o.std)

@@ -176,7 +176,7 @@ def test_what_one_speed_cannot_tell_is_said_with_its_numbers(slow: float) -> Non
     assert told.model.period == 360.0
     alone = ta.selfcal(log, orders=[1, 2], loop="open")
     assert not alone.orders
-    assert alone.summary().startswith("NO CORRECTION: no order is the encoder's alone; ")
+    assert alone.summary().startswith("NO CORRECTION: no order is due to the encoder alone; ")
     assert not any(n.startswith("one speed") for n in alone.notes)
 
 
