@@ -108,12 +108,14 @@ def short_report(study: Study) -> str:
             (before, after), (whole, left) = found.positions, found.dense
             there = f"{before:4.0f} -> {after:3.0f} ({found.at_positions:+.0f} %)"
             between = f"{whole:4.0f} -> {left:3.0f} ({found.in_between:+.0f} %)"
-            lines.append(f"  {name} {what:21}  {there:18}  {between}")
+            lines.append(f"  joint {name}, {what:14}  {there:18}  {between}")
 
-    add(study.published, "of the paper")
-    add(study.gear, "of the gear")
-    lines.append("  The 36 readings of both are the same: only other positions separate them.")
-    add(study.planned, "of the gear, 2 mounts")
+    add(study.published, "paper's orders")
+    add(study.gear, "gear orders")
+    lines.append(
+        "  Both orders give the same 36 readings: only other positions separate them."
+    )
+    add(study.planned, "gear, 2 mounts")
     lines.append(
         f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg,\n"
         f"  standard errors {plan.worst_noise_factor:.2f} times the ideal"

@@ -99,4 +99,4 @@ def test_the_notebook_runs(monkeypatch):
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
     assert sum("image/png" in output.get("data", {}) for output in outputs) == 6
     text = "".join(output.get("text", "") for output in outputs)
-    assert "The 36 readings of both are the same" in text
+    assert "give the same 36 readings" in text
