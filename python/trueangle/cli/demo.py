@@ -112,9 +112,7 @@ def short_report(study: Study) -> str:
 
     add(study.published, "paper's orders")
     add(study.gear, "gear orders")
-    lines.append(
-        "  Both orders give the same 36 readings: only other positions separate them."
-    )
+    lines.append("  Both orders give the same 36 readings: only other positions separate them.")
     add(study.planned, "gear, 2 mounts")
     lines.append(
         f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg,\n"
