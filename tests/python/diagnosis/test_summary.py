@@ -114,13 +114,13 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
     assert "motor order 2: wrong phase" in text
 
 
-def test_what_is_not_understood_is_told_by_size_share_and_chance(result) -> None:
+def test_what_is_not_understood_is_told_by_size_and_chance(result) -> None:
     rest = result.unexplained
     sure, rare = (replace(rest.evidence[0], p=p, decides=True, says=says)
                   for p, says in ((1e-20, "first of 12 arcsec"), (0.0023, "second")))  # fmt: skip
     made = replace(rest, found=True, rms=5.5, share=0.375, evidence=[sure, rare])
     text = flat(diagnosis_summary(replace(result, unexplained=made)))
-    assert "NOT UNDERSTOOD: at least 5.500 arcsec rms (38 % of the residual variance)" in text
+    assert "NOT UNDERSTOOD: 5.500 arcsec rms or more has no known cause." in text
     assert "- first of 12 arcsec (p below 1e-12)" in text
     assert "- second (p 0.002)" in text
 
