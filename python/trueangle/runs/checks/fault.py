@@ -42,7 +42,8 @@ class DataFault(NamedTuple):
     runs : tuple of str
         Labels of the runs that have it.
     rows : tuple of int
-        Readings, counted from 1 within their run; empty where whole runs are meant.
+        Counted from 1 within each file (the header not counted), or within the run where there
+        is none, and in the texts; empty where whole runs are meant.
     says : str
     mend : str
         What to do.

@@ -56,6 +56,8 @@ class Record:
         Of the first run of a file: the channels of all its runs.
     stride : int
         Every so many readings of the run are in it.
+    rows : ndarray of int or None
+        Row of each reading in its file, from 1, where there is one.
     """
 
     label: str
@@ -71,6 +73,7 @@ class Record:
     clocks: tuple[str, ...] = ()
     channels: RecordedChannels | None = None
     stride: int = 1
+    rows: NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return int(self.reference.size)
@@ -94,7 +97,8 @@ class Record:
 
     def fault(self, fault: str, at: Iterable[int], says: str, mend: str) -> DataFault:
         """A fault of it, in its readings ``at``, from 0."""
-        return DataFault.of(fault, [self.label], [self.number(k) for k in at], says, mend)
+        rows = [self.number(k) if self.rows is None else int(self.rows[k]) for k in at]
+        return DataFault.of(fault, [self.label], rows, says, mend)
 
     def number(self, at: int) -> int:
         """Of a reading in its run, from 1."""
@@ -123,16 +127,16 @@ def records_of(runs: Iterable[CalibrationRun]) -> list[Record]:
 
 
 def _record(
-    label: str, of: Any, rows: Any, signals: Mapping[str, Array | None], **known: Any
+    label: str, of: Any, at: Any, signals: Mapping[str, Array | None], **known: Any
 ) -> Record:
     """Some rows of a run or a table, its angles and signals in degrees."""
     scale = 360.0 / of.period
     return Record(
         label,
-        of.reference[rows] * scale,
-        of.indicated[rows] * scale,
+        of.reference[at] * scale,
+        of.indicated[at] * scale,
         **{
-            name: values[rows] * (scale if name in ("velocity", "mount") else 1.0)
+            name: values[at] * (scale if name in ("velocity", "mount") else 1.0)
             for name, values in signals.items()
             if name in FIELDS and values is not None
         },
@@ -167,6 +171,7 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
                     deviations=_deviations(table.table),
                     clocks=_clocks(table.table),
                     channels=channels if i == 0 else None,
+                    rows=np.arange(1, table.reference.size + 1)[rows],
                 )
             )
     return found

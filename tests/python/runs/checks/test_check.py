@@ -112,14 +112,14 @@ def test_a_fault_is_found_alone(fault: str, tmp_path: Path) -> None:
         assert all(f.says and f.mend and f.runs for f in found.data_faults)
 
 
-def test_readings_are_counted_in_their_run(tmp_path: Path) -> None:
+def test_rows_are_those_of_the_file_and_texts_count_in_the_run(tmp_path: Path) -> None:
     runs, labels = faulty("unsorted_time", np.random.default_rng(3))
     fault = ta.check(written(tmp_path, runs, labels)).data_faults[0]
-    assert fault.rows == (101 + 1,)
+    assert fault.rows == (300 + 101 + 1,)
     assert fault.runs == ("b",)
     runs, labels = faulty("missed_counts", np.random.default_rng(4))
     fault = ta.check(written(tmp_path, runs, labels)).data_faults[0]
-    assert fault.rows == (140 + 1,)
+    assert fault.rows == (300 + 140 + 1,)
     assert fault.says.startswith("the error of run b jumps by -7.2 deg at reading 141 and stays")
 
 
