@@ -36,6 +36,7 @@ pub mod lstsq;
 pub mod mixture;
 pub mod moments;
 pub mod monitor;
+pub mod outliers;
 pub mod rank;
 pub mod rounded;
 pub mod spectrum;

@@ -23,6 +23,7 @@ mod monitor;
 mod motion;
 mod noise;
 mod number;
+mod outliers;
 mod release;
 mod robot;
 mod robotparts;
@@ -98,6 +99,9 @@ mod _core {
 
     #[pymodule_export]
     use super::noise::{block_products, clipped, median, rounded, rounded_drawn, two_normals};
+
+    #[pymodule_export]
+    use super::outliers::{outliers, sensor_count};
 
     #[pymodule_export]
     use super::robot::PyRobotStep;

@@ -587,6 +587,20 @@ def sample_residuals(
     threads: int | None = None,
 ) -> NDArray[np.float64]: ...
 def median_magnitude(values: NDArray[np.float64], most: int) -> float: ...
+def outliers(
+    error: NDArray[np.float64],
+    angle: NDArray[np.float64],
+    indicated: NDArray[np.float64],
+    period: float,
+    *,
+    wild: float,
+    share: float,
+    fewest: int,
+    sample: int,
+) -> list[tuple[int, float]]: ...
+def sensor_count(
+    error: NDArray[np.float64], indicated: NDArray[np.float64], period: float
+) -> float: ...
 def residuals(
     indicated: NDArray[np.float64],
     reference: NDArray[np.float64],

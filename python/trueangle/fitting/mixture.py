@@ -65,13 +65,8 @@ def fit_mixture(
     while True:
         problem = Problem(runs, resolve(selection), selection.argument)
         travel = some_angles(problem.angles, problem.period)
-        assert selection.estimate is not None
-        if len(runs) > 1:
-            check_new_run(selection.estimate, travel)
         fitted, uncertainty = _fitted(problem, selection, weights, travel)
-        if not robust:
-            return MixtureFit(selection, problem, RobustFit(fitted, None, 0), uncertainty)
-        after, far = _inliers(problem, fitted, given, floor)
+        after, far = _inliers(problem, fitted, given, floor) if robust else (weights, 0.0)
         same = all(((a > 0.0) == (w > 0.0)).all() for a, w in zip(after, weights, strict=True))
         if same or rounds == 0:
             break
@@ -80,6 +75,9 @@ def fit_mixture(
         selection = choose([replace(r, weights=w) for r, w in zip(runs, weights, strict=True)])
         if not selection.orders:
             raise NoOrderError(f"no model: {selection.reason}")
+    # Not before: an outlier of one run is a difference between runs.
+    if len(runs) > 1 and selection.estimate is not None:
+        check_new_run(selection.estimate, travel)
     wild = rejected(weights, given)
     weighted = RobustFit(fitted, weights if wild else None, wild, far, 0 if same else _ROUNDS)
     return MixtureFit(selection, problem, weighted, uncertainty)

@@ -14,10 +14,8 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.lattice import sensor_lattice
-from ..runs.outliers import WILD, WILD_SHARE, robust_scale, spikes
+from ..runs.outliers import WILD, WILD_SHARE, outlying, robust_scale
 from ..runs.run import CalibrationRun
-from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import brief_number
 from ..support.suggestions import check_choice
@@ -173,23 +171,15 @@ def _set_aside(problem: Problem, floor: float) -> RobustFit:
 
 
 def without_spikes(run: CalibrationRun) -> CalibrationRun:
-    """The run with isolated outliers given weight 0, found without any model.
+    """The run with outliers given weight 0, found without any model.
 
     For choosing orders (`trueangle.runs.outliers`); `fit_robustly` looks again with the model.
     """
-    given = given_weights(run.weights, len(run))
-    used = slice(None) if run.weights is None else given > 0.0
-    error, reference = run.centred_error[used], run.reference[used]
-    wild, distance = spikes(error, reference, run.period)
-    if wild.any():
-        turns = run.unwrapped_reference * (2.0 * math.pi / run.period)
-        count = sensor_lattice([run], turns)[0] * run.period / ARCSEC_PER_TURN
-        # Counts of a sensor up to which a reading differs from its neighbours by being rounded.
-        wild &= distance > 2.0 * count
-    if not wild.any():
+    rows, _ = outlying(run)
+    if not rows.size:
         return run
-    weights = given.copy()
-    weights[used] = np.where(wild, 0.0, given[used])
+    weights = given_weights(run.weights, len(run)).copy()
+    weights[rows] = 0.0
     return replace(run, weights=weights)
 
 

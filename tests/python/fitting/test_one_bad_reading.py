@@ -66,3 +66,21 @@ def test_check_names_no_row_of_a_run_too_short_to_tell(size):
     x = np.linspace(0.5, 5.0, size)
     y = x + np.where(np.arange(size) == size // 2, 0.3, 0.0)
     assert [f for f in ta.check(ta.CalibrationRun(x, y)).data_faults if f.fault == "outliers"] == []
+
+
+@pytest.mark.parametrize("kind", ["same", "opposite", "frozen"])
+@pytest.mark.parametrize("several", [2, 3, 5])
+@pytest.mark.parametrize("places", [np.tile(np.arange(36.0), 5), np.arange(0.0, 54.0, 0.1)])
+def test_several_side_by_side_are_told_as_one_is(places, several, kind):
+    x = 10.0 * places
+    y = x + 0.02 * np.sin(np.radians(x)) + 5e-4 * np.random.default_rng(1).standard_normal(x.size)
+    expected = ta.fit(ta.CalibrationRun(x, y, 360.0, label="r")).model.shafts[0].orders
+    rows = np.arange(70, 70 + several)
+    sign = np.where(rows % 2, -1.0, 1.0) if kind == "opposite" else 1.0
+    y[rows] = y[69] if kind == "frozen" else y[rows] + 0.3 * sign
+    fit = ta.fit(run := ta.CalibrationRun(x, y, 360.0, label="r"))
+    assert fit.model.shafts[0].orders == expected
+    assert [row for _, row in sorted(fit.wild)] == rows.tolist()
+    (fault,) = ta.check(run).data_faults
+    assert fault.fault == ("stale_samples" if kind == "frozen" else "outliers")
+    assert fault.rows == tuple(rows + 1)

@@ -1,4 +1,4 @@
-"""Rows that do not fit the other readings: repeated ones, isolated outliers, steps that stay."""
+"""Rows that do not fit the other readings: repeated ones, outliers, steps that stay."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...support.angles import wrap
 from ...support.arrays import Array, distinct, median, quantile
 from ...support.display_units import brief_number
 from ...support.layout import counted
-from ..outliers import WILD, robust_scale, spikes
+from ..outliers import WILD, outlying, robust_scale
 from ..run import CalibrationRun
 from .fault import REPEATS, DataFault
 from .record import LEAST_READINGS, Record, records_of
+from .still import stale_fault
 
 #: Readings on either side of a step that show whether it stays.
 _BESIDE: Final = 7
@@ -163,36 +163,30 @@ def _lost(
 
 
 def outliers(records: Iterable[Record], faults: Iterable[DataFault]) -> Iterator[DataFault]:
-    """Rows that are isolated outliers, of runs in which no other fault explains them."""
+    """Rows that are outliers, of runs that no other fault explains, and repeated samples."""
     unsure = {label for fault in faults if fault.fault not in REPEATS for label in fault.runs}
     for record in records:
         if record.label in unsure or len(record) < 2:
             continue
-        far, distance = _isolated(record)
-        rows = np.flatnonzero(far)
-        if rows.size:
-            most = int(np.argmax(np.where(far, distance, 0.0)))
+        far, distance = outlying(record.run)
+        good = np.arange(len(record))
+        good[far] = 0
+        before = np.maximum.accumulate(good)[far]
+        for name, angle in (("indicated", record.indicated), ("reference", record.reference)):
+            held = (before < far) & (angle[far] == angle[before])
+            if held.any():
+                yield stale_fault(record, name, far[held].tolist())
+            far, before, distance = far[~held], before[~held], distance[~held]
+        if far.size:
+            most = int(np.argmax(distance))
             yield record.fault(
                 "outliers",
-                rows,
-                f"{counted(rows, 'reading')} of {record.name} "
-                f"{'are' if rows.size > 1 else 'is'} far off the neighbours in angle: reading "
-                f"{most + 1} by {brief_number(float(distance[most]))} deg",
+                far,
+                f"{counted(far, 'reading')} of {record.name} "
+                f"{'are' if far.size > 1 else 'is'} far off the neighbours in angle: reading "
+                f"{record.number(int(far[most]))} by {brief_number(float(distance[most]))} deg",
                 "check these readings; `fit` and `diagnose` reject them",
             )
-
-
-def _isolated(record: Record) -> tuple[NDArray[np.bool_], Array]:
-    """Which readings are isolated outliers, and how far each is off its neighbours, deg."""
-    error = record.run.centred_error
-    far, distance = spikes(error, record.reference, 360.0)
-    if far.any():
-        # A sensor that rounds differs from its neighbours by its counts, which its errors span.
-        steps = np.diff(np.unique(record.indicated[~far]))
-        far &= distance > 2.0 * steps.min(initial=np.ptp(error[~far]), where=steps > 0.0)
-        # What several readings in a row show is an effect, not an outlier.
-        far &= np.convolve(far, np.ones(7), "same") < 1.5
-    return far, distance
 
 
 def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:

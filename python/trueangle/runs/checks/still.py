@@ -11,11 +11,13 @@ and between two counts. So a constant column is a fault only by what it does whe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+import trueangle._core as _core
 
 from ...support.arrays import Array, median, quantile
 from ...support.layout import counted
@@ -46,13 +48,6 @@ _ONWARD: Final = 0.7
 
 #: Readings on both sides whose speeds are compared.
 _BESIDE: Final = 5
-
-#: A column has a lattice where its steps take at most this many values, each at least this often.
-_VALUES: Final = 12
-_TIMES: Final = 5
-
-#: Steps are even to this part of one.
-_EVEN: Final = 1e-3
 
 #: Repeats are the exception below this share of readings, and the rule where this share of them
 #: is equally long.
@@ -123,13 +118,18 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
     # Rows from which on stale readings are a fault of the data and no coincidence, where they come
     # more than once; at one place a command that is held would do.
     if len(stale) >= (3 if times > 1 else _HELD):
-        yield record.fault(
-            "stale_samples",
-            stale,
-            f"the {name} angle of {record.name} does not change in {counted(stale, 'reading')} "
-            f"(first: {stale[0] + 1}) while the joint moves: the log repeats old samples",
-            "remove these readings, or log each sample once, with its own time stamp",
-        )
+        yield stale_fault(record, name, stale)
+
+
+def stale_fault(record: Record, name: str, at: Sequence[int]) -> DataFault:
+    """Readings of a column that repeat the one before."""
+    return record.fault(
+        "stale_samples",
+        at,
+        f"the {name} angle of {record.name} does not change in {counted(at, 'reading')} "
+        f"(first: {record.number(at[0])}) while the joint moves: the log repeats old samples",
+        "remove these readings, or log each sample once, with its own time stamp",
+    )
 
 
 def _within(
@@ -146,33 +146,13 @@ def _least(own: Array, other: Array, lengths: NDArray[np.intp]) -> float:
     """Travel of the other channel that noise and counts of this one do not explain."""
     slip = np.diff(own - other)
     noise = 1.4826 * float(median(np.abs(slip - median(slip))))
-    mine, beside = _lattice(own), _lattice(other)
-    if not (mine and beside):  # places that are evenly spaced are no counts
-        mine, beside = (0.0 if _is_even(x) else c for x, c in ((own, mine), (other, beside)))
+    mine, beside = (_core.sensor_count(own - other, angle, 360.0) for angle in (own, other))
     if mine == 0.0 and int(lengths.sum()) > _RARE * own.size:
         repeats = float(np.mean(lengths == median(lengths)))
         if repeats < _RULE:  # counts that are not of one size
             steps = np.abs(np.diff(own))
             mine = _STEPS / _COUNTS * float(quantile(steps[steps > 0.0], 0.01))
     return _FAR * noise + _COUNTS * mine + beside
-
-
-def _lattice(angle: Array) -> float:
-    """The count of a column whose steps take few values, else 0."""
-    steps = np.abs(np.diff(angle))
-    moved = steps[steps > 0.0]
-    # `np.unique` would import `numpy.ma`, a tenth of a small command's time.
-    values = 1 + np.count_nonzero(np.diff(np.sort(np.round(moved, 7))))
-    if moved.size == 0 or values > _VALUES or moved.size < _TIMES * values:
-        return 0.0
-    return float(quantile(moved, 0.01))
-
-
-def _is_even(angle: Array) -> bool:
-    """Whether nearly all steps are one and the same."""
-    steps = np.abs(np.diff(angle))
-    typical = float(median(steps))
-    return typical > 0.0 and float(np.mean(np.abs(steps - typical) <= _EVEN * typical)) >= _RULE
 
 
 def _speeds(other: Array, time: Array | None) -> Array:

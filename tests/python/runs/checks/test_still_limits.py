@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import trueangle._core as _core
 from trueangle.runs.checks.record import Record
-from trueangle.runs.checks.still import _is_even, _lattice, _least, stuck_readings
+from trueangle.runs.checks.still import _least, stuck_readings
 
 SEED = 27_400
 NONE = np.zeros(0, dtype=np.intp)
@@ -37,12 +38,10 @@ def test_counts_of_both_columns_are_allowed_for() -> None:
     rng = np.random.default_rng(SEED + 1)
     place = np.cumsum(rng.uniform(0.2, 1.8, 4000))
     fine, coarse = (np.round(place / count) * count for count in (0.5, 0.8))
-    assert _lattice(fine) == pytest.approx(0.5)
-    assert _lattice(coarse) == pytest.approx(0.8)
-    assert _lattice(place) == 0.0
+    for angle, count in ((fine, 0.5), (coarse, 0.8), (place, 0.0)):
+        assert _core.sensor_count(angle - place, angle, 360.0) == pytest.approx(count)
     even = 0.8 * np.arange(4000.0)
-    assert _is_even(even)
-    assert not _is_even(fine)
+    near = even + 0.01 * rng.normal(size=even.size)
     noise = 6.0 * 1.4826
 
     def mad(own: np.ndarray, other: np.ndarray) -> float:
@@ -54,20 +53,11 @@ def test_counts_of_both_columns_are_allowed_for() -> None:
         (coarse, fine, 1.5 * 0.8 + 0.5),
         (fine, place, 1.5 * 0.5),
         (place, fine, 0.5),
-        (place, even, 0.0),
-        (even, place, 0.0),
+        (near, even, 0.0),
+        (even, near, 0.0),
     ):
         wanted = noise * mad(own, other) + counts
         assert _least(own, other, NONE) == pytest.approx(wanted, rel=1e-6)
-
-
-@pytest.mark.parametrize(("values", "times", "lattice"), [
-    (12, 5, True), (13, 5, False), (12, 4, False), (3, 5, True),
-])  # fmt: skip
-def test_a_lattice_has_few_steps_each_many_times(values: int, times: int, lattice: bool) -> None:
-    steps = np.tile(1.0 + np.arange(values), times)
-    angle = np.cumsum(np.concatenate([[0.0, 0.0], steps, [0.0]]))
-    assert (_lattice(angle) > 0.0) == lattice
 
 
 def noisy(path: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
