@@ -244,17 +244,26 @@ impl Readings<'_> {
                     along.clone().find(|&other| !far[other]).unwrap_or(row)
                 };
                 let (distance, off) = self.chord(next(n - 1), row, next(1));
-                let before = (0..row).rev().find(|&other| !far[other]);
-                let after = (row + 1..n).find(|&other| !far[other]);
-                let (a, b) = (
-                    before.or(after).unwrap_or(row),
-                    after.or(before).unwrap_or(row),
-                );
+                let before = |row: usize| (0..row).rev().find(|&other| !far[other]);
+                let after = |row: usize| (row + 1..n).find(|&other| !far[other]);
+                let a = before(row).or(after(row)).unwrap_or(row);
+                let b = after(row).unwrap_or(a);
                 let share = row.abs_diff(a) as f64 / a.abs_diff(b).max(1) as f64;
-                // Where the joint starts or stops, the error jumps and comes back little by little.
+                // Where the joint starts or stops, the error jumps, on no line from either side,
+                // and comes back little by little.
                 let jump = self.error[b] - self.error[a];
+                let beyond = |from: usize, to: Option<usize>| {
+                    to.map_or(f64::INFINITY, |to| {
+                        let slope = (self.error[from] - self.error[to]) / (from as f64 - to as f64);
+                        (jump - slope * (b as f64 - a as f64)).abs()
+                    })
+                };
+                let jumps = jump
+                    .abs()
+                    .min(beyond(a, before(a)))
+                    .min(beyond(b, after(b)));
                 let away = (self.error[row] - self.error[a] - share * jump).abs();
-                if off > self.limit && away > self.limit.max(2.0 * jump.abs()) {
+                if off > self.limit && away > self.limit.max(2.0 * jumps) {
                     found.push((row, distance));
                 }
             }
@@ -273,7 +282,7 @@ impl Readings<'_> {
 }
 
 /// Count of a sensor, by the least difference of its readings and of their steps: the lattice that all lie on; 0 for
-/// none, and for that of places, which the errors do not span.
+/// none, and for that of places, which is no finer than they are and not spanned by the errors.
 pub fn sensor_count(error: &[f64], indicated: &[f64], period: f64) -> f64 {
     // Smaller differences are the rounding of sums.
     let differences = |mut values: Vec<f64>| -> Vec<f64> {
@@ -297,10 +306,14 @@ pub fn sensor_count(error: &[f64], indicated: &[f64], period: f64) -> f64 {
         away += step / count - (step / finest).round();
         (low, high) = (low.min(away), high.max(away));
     }
+    let places = indicated.iter().zip(error).map(|(x, e)| x - e).collect();
+    let grid = differences(places)
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
     let mut some = error.to_vec();
     let span = rank(&mut some, 0.8) - rank(&mut some, 0.2);
     // A twentieth of a count is lost to digits that were cut off.
-    if high - low < 0.05 && count <= 4.0 * span {
+    if high - low < 0.05 && (count <= 4.0 * span || 2.0 * count < grid) {
         count
     } else {
         0.0
