@@ -3,7 +3,7 @@
 //! Of all readings with one zero the Gram matrix is enough: the search, evidences and posteriors
 //! need no further pass.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::gains::Solved;
 use super::gram::{Gram, Sums};
@@ -79,21 +79,6 @@ impl GroupSums {
             score: found.score - none,
             model: Model::of_groups(self.widths.clone(), tau),
         })
-    }
-
-    /// Those of the errors less a function of the columns.
-    pub fn less(&self, coefficients: &[f64]) -> Self {
-        let mut left = self.clone();
-        let (own, sums) = (
-            DVector::from_column_slice(coefficients),
-            &mut left.gram.sums,
-        );
-        let taken = &sums.products * &own;
-        sums.squares[(0, 0)] += own.dot(&taken) - 2.0 * own.dot(&sums.moments.column(0));
-        sums.squares[(0, 0)] = sums.squares[(0, 0)].max(0.0);
-        sums.moments.column_mut(0).axpy(-1.0, &taken, 1.0);
-        left.gram.level -= left.gram.means.dot(&own);
-        left
     }
 
     /// `X' C^-1 X` of all columns, without a zero beside them.

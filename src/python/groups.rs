@@ -128,14 +128,6 @@ impl PyGroupSums {
         Ok((found.score, found.model.tau))
     }
 
-    /// The sums of the errors less a function of all columns.
-    fn less(&self, coefficients: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
-        let own = values(&coefficients);
-        let columns = self.0.widths().iter().sum();
-        same_length("coefficients", own.len(), "columns", columns)?;
-        Ok(Self(self.0.less(&own)))
-    }
-
     /// Inverse covariance of the coefficients of all columns, without a zero beside them.
     fn information<'py>(&self, py: Python<'py>) -> PyResult<Matrix<'py>> {
         let found = self.0.information();

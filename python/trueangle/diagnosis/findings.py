@@ -11,6 +11,7 @@ from ..effects.effect import Effect, ScatterFinding
 from ..estimation.quantity import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
 from ..runs.checks.fault import DataFault
+from ..support.arrays import Array
 from ..support.deadline import current_deadline
 from .confirmation import CONFIRMED, NOT_CONFIRMED, confirmation_status
 from .correctable import measure_more
@@ -99,6 +100,39 @@ def findings_of(
     shared |= dependent
     doubtful = [k for f in findings if not f.confirmed for k in f.group if k not in shared]
     return findings, spots + alike, doubtful
+
+
+def remeasured_findings(
+    less: Regression,
+    kept: Sequence[int],
+    findings: Sequence[Finding],
+    columns: Array,
+    covariance: Array,
+) -> list[Finding]:
+    """Confirmed findings with the parameters of readings less free functions of factors.
+
+    Parameters
+    ----------
+    less : Regression
+        With some of the terms that the findings are of.
+    kept : sequence of int
+        Which of them.
+    findings : sequence of Finding
+    columns, covariance : ndarray
+        Of the free functions.
+    """
+    less = with_unseen_orders(with_form_errors(less))
+    shift = less.back @ (less.q.T @ less.whiten(columns))
+    before = 0.0 if less.form_errors is None else less.form_errors
+    less = replace(less, form_errors=before + shift @ covariance @ shift.T)
+    found = []
+    for finding in findings:
+        if finding.confirmed and finding.group and {*finding.group} <= {*kept}:
+            group = [kept.index(k) for k in finding.group]
+            parameters, effects = _reported(less, less, group, [])
+            finding = replace(finding, parameters=finding.parameters | parameters, effects=effects)
+        found.append(finding)
+    return found
 
 
 def _reported(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from .factors.factor import Factor
 from .factors.group import TOGETHER
 from .factors.statement import account_rows, stated_factors
 from .finding import Finding
-from .findings import findings_of, reconsidered_findings
+from .findings import findings_of, reconsidered_findings, remeasured_findings
 from .goodness.unexplained import Unexplained
 from .holdout import rebuilt_term
 from .penalty import regression_without, total_penalty
@@ -67,21 +67,34 @@ class NamedCauses:
         explained = [f.fitted for f in alone if f.fitted is not None]
         if not explained:
             return self.rest
-        chosen, rows = self.chosen, np.zeros(self.chosen.n, dtype=bool)
-        rows[account_rows(chosen)] = True
-        part = chosen.of_rows(rows)
-        less = part.of_readings(part.readings.less(np.sum(explained, axis=0)))
-        less = less.with_terms(rebuilt_term(term, rows) for term in chosen.terms)
-        for k in reversed(free_paths(less)):
-            # A path in time that only followed what the factors explain.
-            other = regression_without(less, [k], settled=True)
-            less = min(less, other, key=total_penalty)
-        return unexplained_remainder(less, sigma, chosen)
+        terms = range(len(self.chosen.terms))
+        less, _ = beyond_factors(self.chosen, np.sum(explained, axis=0), terms)
+        return unexplained_remainder(less, sigma, self.chosen)
 
     @property
     def unnamed(self) -> float:
         """Variance of what the readings follow and no name fits."""
         return sum(factor.rms**2 for factor in self.factors if not factor.named_by)
+
+
+def beyond_factors(
+    chosen: Regression, function: Array, terms: Iterable[int]
+) -> tuple[Regression, list[int]]:
+    """Readings less what factors explain, by some of the terms, and which of them.
+
+    A path in time that only followed what the factors explain is none of them.
+    """
+    kept, rows = list(terms), np.zeros(chosen.n, dtype=bool)
+    rows[account_rows(chosen)] = True
+    part = chosen.of_rows(rows)
+    less = part.of_readings(part.readings.less(function))
+    less = less.with_terms(rebuilt_term(chosen.terms[k], rows) for k in kept)
+    for k in reversed(free_paths(less)):
+        other = regression_without(less, [k], settled=True)
+        if total_penalty(other) < total_penalty(less):
+            less = other
+            del kept[k]
+    return less, kept
 
 
 def named_causes(
@@ -202,7 +215,7 @@ def _named(
         rest = unexplained_remainder(others, sigma)
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
-    held, factors, moved = stated_factors(chosen, findings)
+    held, factors, moved, beyond = stated_factors(chosen, findings)
     # Causes that are not distinguished, or were not tried, predict different errors in other
     # runs: no curve represents them.
     seen = [spot for spot in spots if spot.supported]
@@ -211,4 +224,13 @@ def _named(
     factors = [f if any(f is other for other in kept) else replace(f, effects=()) for f in factors]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
+    # A function that may be another factor's is no ground for narrower errors.
+    is_open = any(f.not_distinguished_from for f in factors if not f.named_by)
+    if beyond is not None and not is_open:
+        function, columns, covariance = beyond
+        sure = {k for finding in held if finding.confirmed for k in finding.group}
+        effects = [(k, term, EFFECTS[term.cause]) for k, term in enumerate(chosen.terms)]
+        also = {k for k, t, e in effects if not e.form_of or e.describes_noise(t)}
+        less, places = beyond_factors(chosen, function, sorted(sure | also))
+        held = remeasured_findings(less, places, held, columns, covariance)
     return NamedCauses(chosen, rest, held, spots, factors, lost, moved)

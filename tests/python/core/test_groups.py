@@ -85,20 +85,6 @@ def test_the_search_finds_the_best_of_all_models_beside_what_is_given(seed):
         assert tau[3] == given[3]
 
 
-def test_sums_less_a_function_are_those_of_errors_less_it():
-    parts, rng = made(4), np.random.default_rng(4)
-    own = rng.standard_normal(sum(WIDTHS))
-    noise = rng.uniform(0.1, 1.0, 6)
-    less = Groups(parts, WIDTHS).sums(noise, 1.0).less(own)
-    wanted = Groups([(x, y - x @ own, t) for x, y, t in parts], WIDTHS).sums(noise, 1.0)
-    for tau in itertools.product((0.0, 0.7), repeat=len(WIDTHS)):
-        found, there = less.posterior(tau), wanted.posterior(tau)
-        assert found[0] == pytest.approx(there[0], abs=SAME * abs(there[0]))
-        np.testing.assert_allclose(found[1], there[1], rtol=0.0, atol=SAME)
-    with pytest.raises(ta.errors.ArgumentError, match="coefficients"):
-        less.less(own[1:])
-
-
 def test_changes_are_differences_of_the_evidence():
     sums = Groups(made(1), WIDTHS).sums([0.8, 0.1, 0.1, 0.1, 0.1, 0.1], 4.0)
     sizes = 4.0 * 10.0 ** (-4.0 + 0.8 * np.arange(7))

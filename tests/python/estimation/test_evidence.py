@@ -255,7 +255,7 @@ def test_as_good_as_least_squares_that_knows_orders_and_noise(arc: float) -> Non
         ours[kind, seed] = np.mean(apart**2)
         theirs[kind, seed] = np.mean((columns @ (best_known(KINDS[kind], runs) - sizes)) ** 2)
         held[kind, seed] = np.mean(np.abs(apart) < 1.96 * std)
-        assert arc < 360.0 or found.included == (1, 2, 4), (KINDS[kind], seed)
+        assert arc < 360.0 or found.present == (1, 2, 4), (KINDS[kind], seed)
     assert ours.sum() <= 1.25**2 * theirs.sum()
     # Of each noise alone twelve pairs of runs scatter more.
     assert (ours.sum(axis=1) <= 1.4**2 * theirs.sum(axis=1)).all()
@@ -291,7 +291,7 @@ def test_what_differs_from_run_to_run_widens_the_interval() -> None:
             noise = 2.0 * rng.normal(size=150)
             runs.append(RunReadings(theta, harmonics(theta, [1, 4]) @ own + noise))
         found = estimate_by_evidence(runs, range(1, 9))
-        assert found.included == (1, 4)
+        assert found.present == (1, 4)
         std = np.sqrt(np.diag(found.covariance))
         pulls += list((found.mean[:2] - [50.0, -20.0]) / std[:2])
         differs += found.models[0].omega[0] > 0.0
@@ -330,7 +330,30 @@ def test_one_even_run_has_no_orders_that_are_noise(correlation: float) -> None:
     for seed in range(8):
         noise = root @ np.random.default_rng(6600 + seed).normal(size=144)
         run = RunReadings(theta, 9.0 * np.cos(theta + 1.0) + 5.0 * np.sin(2.0 * theta) + noise)
-        assert estimate_by_evidence([run], range(1, 31)).included == (1, 2)
+        assert estimate_by_evidence([run], range(1, 31)).present == (1, 2)
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0])
+def test_errors_of_one_run_hold_in_slow_noise(power: float) -> None:
+    """Whose spectrum falls with a power of the frequency: 1/f noise, and a walk."""
+    theta, orders = np.arange(900) * math.radians(0.4), (1, 2, 5)
+    frequency = np.fft.rfftfreq(8 * 900)[1:]
+    pulls, false = [], 0
+    for seed in range(30):
+        rng = np.random.default_rng([480, seed])
+        waves = np.append(
+            0.0, rng.normal(size=(2, frequency.size)).T @ (1.0, 1j) / frequency**power
+        )
+        noise = np.fft.irfft(waves)[:900]
+        noise = 3.0 * noise / noise.std() + rng.normal(size=900)
+        truth = rng.normal(0.0, 40.0, 6)
+        run = RunReadings(theta, harmonics(theta, orders) @ truth + noise, 0.01 * np.arange(900.0))
+        found = estimate_by_evidence([run], range(1, 41))
+        false += not {*found.present} <= {*orders}
+        own = np.repeat([2 * found.told.index(m) for m in orders], 2) + [0, 1] * 3
+        pulls.append((found.mean[own] - truth) / np.sqrt(np.diag(found.covariance)[own]))
+    assert 0.85 < np.sqrt(np.mean(np.square(pulls))) < 1.25
+    assert false <= 2
 
 
 def test_a_probability_is_no_more_than_one() -> None:
@@ -356,7 +379,7 @@ def test_orders_that_the_places_cannot_distinguish_share_their_probability() -> 
     assert equal.probability[1] == pytest.approx(equal.probability[2], abs=1e-6)
     assert equal.probability[1:].sum() > 0.99
     unequal = estimate_by_evidence([run], [1, 3, 13], [0.3, 0.3, 0.01])
-    assert unequal.included == (3,)
+    assert unequal.present == (3,)
     # Where they were read, the curve is known although the order is not.
     places = theta[:16]
     curve, std = equal.curve(places)

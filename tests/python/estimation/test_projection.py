@@ -79,7 +79,7 @@ def test_what_candidates_save_is_what_a_fit_with_them_saves(kind: tuple) -> None
     assert found.gain(blocks[4])[0] == gains[4] == 0.0
     assert not found.gain(blocks[4])[1].any()
     assert found.gains(x).tolist() == found.fixed_gains(x).tolist() == [0.0] * 4
-    assert found.as_deviance(0.25 * found.rss) == pytest.approx(-N * np.log(0.75))
+    assert found.as_deviances(0.25 * found.rss) == pytest.approx(-N * np.log(0.75))
     pairs = np.hstack(blocks[1:3]).astype(np.float32)
     np.testing.assert_allclose(found.pair_gains(BlockProducts(pairs, 2)), gains[1:3], rtol=2e-3,
                                atol=2e-3)  # fmt: skip

@@ -124,8 +124,8 @@ def test_all_that_is_saved_is_finite_and_no_more_than_rounding() -> None:
     found = fitted(q[:, :1], q.sum(axis=1))
     every = N * 15.0 * np.log(10.0)
     for saved in (found.rss, 2.0 * found.rss):
-        assert found.as_deviance(saved) == pytest.approx(every, rel=1e-2)
-    assert found.as_deviance(-found.rss) == pytest.approx(-N * np.log(2.0))
+        assert found.as_deviances(np.array(saved)) == pytest.approx(every, rel=1e-2)
+    assert found.as_deviances(-found.rss) == pytest.approx(-N * np.log(2.0))
 
 
 @pytest.mark.parametrize(("std", "explained"), [(0.9e-6, True), (1.1e-6, False)])

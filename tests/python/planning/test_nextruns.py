@@ -55,7 +55,6 @@ def test_limits_without_any_are_the_arc_and_the_levels_that_were_seen():
     assert limits.temperature_C == (20.0, 20.0)
     assert limits.torque_Nm == (0.0, 0.0)
     assert limits.mount_deg == (0.0,)
-    assert not limits.turns_freely
     whole = Limits.of_runs(simulate(Simulation(runs=(RunDesign(start_deg=77.0),))))
     assert whole.arc_deg == (0.0, 360.0)
     logged = Simulation(runs=(RunDesign(samples=5000), RunDesign(samples=700)))

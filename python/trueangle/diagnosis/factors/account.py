@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._core import Groups, GroupSums
 from ...joint.signals import Signals
@@ -96,29 +97,30 @@ class FactorAccount:
         """Log evidence of a model."""
         return self.sums.posterior(list(tau))[0]
 
-    def less(self, given: Sequence[float], tau: Sequence[float]) -> FactorAccount:
-        """Of what groups that are given leave by themselves: the others of a model.
-
-        Columns that both have are theirs alone.
-        """
-        _, mean, _ = self.sums.posterior(list(given))
-        others = np.where(np.array(given) > 0.0, 0.0, tau).tolist()
-        return replace(self, sums=self.sums.less(mean), tau=others)
+    def any_size(self, given: Sequence[float], tau: Sequence[float]) -> list[float]:
+        """A model with groups that are given of any size: columns that others have are theirs."""
+        return [1e4 * one or other for one, other in zip(given, tau, strict=True)]
 
     def variance(self, tau: Sequence[float], groups: Sequence[int]) -> float:
         """Variance over the readings of what some groups of a model take."""
         _, mean, _ = self.sums.posterior(list(tau))
-        taken: Array = np.zeros(len(self.groups[0].columns))
-        for k in groups:
-            if tau[k] > 0.0:
-                own = slice(int(self.bounds[k]), int(self.bounds[k + 1]))
-                taken = taken + self.groups[k].columns @ mean[own]
-        return float(np.var(taken))
+        own = self.columns_of(groups)
+        return float(np.var(self.columns[:, own] @ mean[own]))
 
     @cached_property
     def bounds(self) -> Array:
         """First column of each group, and the one past the last."""
         return np.cumsum([0, *(group.columns.shape[1] for group in self.groups)])
+
+    @cached_property
+    def columns(self) -> Array:
+        """Those of all groups."""
+        return np.hstack([group.columns for group in self.groups])
+
+    def columns_of(self, groups: Sequence[int]) -> NDArray[np.intp]:
+        """Places of the columns of some groups."""
+        of = np.repeat(np.arange(len(self.groups)), [g.columns.shape[1] for g in self.groups])
+        return np.flatnonzero(np.isin(of, groups))
 
     def without(self, groups: Iterable[int]) -> list[float]:
         """The model less some groups."""
@@ -231,11 +233,11 @@ def factors_of(
 ) -> list[Factor]:
     """The factors that are in, strongest first.
 
-    Of a model with names, of variances ``beside``, the functions are those of what these leave.
-    Lines of the place that are not ``named`` are parts of products with them.
+    Of a model with names, of variances ``beside``, the functions are those next to names of any
+    size. Lines of the place that are not ``named`` are parts of products with them.
     """
-    shown = account if beside is None else account.less(beside, account.tau)
-    _, mean, covariance = shown.sums.posterior(shown.tau)
+    tau = account.tau if beside is None else account.any_size(beside, account.tau)
+    _, mean, covariance = account.sums.posterior(tau)
     lines = [k for k, group in enumerate(account.groups) if group.factor == "place"]
     account = _with_constants(account, mean, named)
     base = account.evidence(account.tau)
@@ -251,8 +253,8 @@ def factors_of(
     for (factor, shaft), members in kinds.items():
         groups = [account.groups[k] for k in members]
         means = [mean[bounds[k] : bounds[k + 1]] for k in members]
-        at = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in members])
-        columns = np.hstack([group.columns for group in groups])
+        at = account.columns_of(members)
+        columns = account.columns[:, at]
         fitted = columns @ mean[at]
         rms, std = _size(columns, mean[at], covariance[np.ix_(at, at)])
         if rms**2 < HELD * account.total:
@@ -386,14 +388,13 @@ def _curve(
     account: FactorAccount, members: Sequence[int], mean: Array, covariance: Array
 ) -> FactorCurve:
     """The function of the strongest axis of a factor's groups."""
-    bounds = account.bounds
     widest = max(members, key=lambda k: account.groups[k].at.size)
     at, unit = account.groups[widest].at, account.groups[widest].unit
     own = [k for k in members if np.array_equal(account.groups[k].at, at)]
     value: Array = np.zeros(at.size)
     variance: Array = np.zeros(at.size)
     products = account.groups[own[0]].is_product
-    index = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in own])
+    index = account.columns_of(own)
     if not products:
         rows = np.hstack([account.groups[k].values_about_mean() for k in own])
         value = rows @ mean[index]

@@ -139,6 +139,14 @@ class NamedForms:
         own = self.account.groups[self.places[name]].alternatives
         return float(np.log(len(self.account.groups) * SIZES * own))
 
+    def beyond(self, sure: Sequence[int], tau: Sequence[float]) -> tuple[Array, Array, Array]:
+        """Free functions beside findings: their sum, their columns, covariance of these."""
+        model = self.account.any_size(self.given(sure), tau)
+        _, mean, covariance = self.account.sums.posterior(model)
+        free = self.account.columns_of([k for k in self.free if tau[k] > 0.0])
+        columns = self.account.columns[:, free]
+        return columns @ mean[free], columns, covariance[np.ix_(free, free)]
+
     def taken(
         self,
         sure: Sequence[int],
@@ -152,12 +160,12 @@ class NamedForms:
         all that it follows. What is met in one direction only is half of the place.
         """
         given, groups = self.given(sure), self.account.groups
-        rest = self.account.less(given, tau)
+        beside = self.account.any_size(given, tau)
         lines = {0.0} if "place" in factors else set()
         lines |= {m for k in own for m in groups[self.places[k]].orders}
         free = [k for k in self.free if self.is_of(k, factors) or groups[k].is_of_line(lines)]
         mine = sum(self.account.variance(given, [self.places[k]]) for k in own)
-        return mine, rest.variance(rest.tau, free)
+        return mine, self.account.variance(beside, [k for k in free if not given[k]])
 
     def same(self, name: int) -> list[str]:
         """Factors whose functions are columns of a finding in this design: speed at one speed."""

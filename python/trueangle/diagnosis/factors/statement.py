@@ -38,7 +38,7 @@ WINDOWS, NEAREST = 40, 3
 
 def stated_factors(
     chosen: Regression, findings: Sequence[Finding]
-) -> tuple[list[Finding], list[Factor], set[float]]:
+) -> tuple[list[Finding], list[Factor], set[float], tuple[Array, Array, Array] | None]:
     """Findings confirmed by their form, and the factors that the readings follow.
 
     A change of a line of the simulation is a finding as any other.
@@ -56,6 +56,8 @@ def stated_factors(
     factors : list of Factor
     moved : set of float
         Lines of the simulation whose change is a part of what the readings follow.
+    beyond : tuple of ndarray, or None
+        What the readings of `account_rows` follow without a name, its columns, their covariance.
     """
     rows = account_rows(chosen)
     signals = chosen.signals.take(rows)
@@ -79,14 +81,17 @@ def stated_factors(
             groups.append(group)
     account = factor_account(signals, error, groups)
     if account is None:
-        return list(findings), [], set()
+        return list(findings), [], set(), None
     names = NamedForms(account, places)
     changes = [Finding(MissingOrder.kind, {}, {}, None, []) for _ in named[count:]]
     found = names_by_form(names, [*findings, *changes])
     lost = [k for k in range(count, len(found)) if not found[k].confirmed]
     moved = {groups[places[k]].orders[0] for k in lost}
     shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
-    return found[:count], _factors(names, found, count, shafts), moved
+    sure = confirmed_names(names, found)
+    beyond = names.beyond(sure, names.beside(sure)[1])
+    factors = _factors(names, found, count, shafts)
+    return found[:count], factors, moved, beyond if beyond[1].size else None
 
 
 def _factors(

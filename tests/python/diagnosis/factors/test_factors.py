@@ -155,6 +155,27 @@ def test_an_order_that_one_run_alone_has_follows_run_and_place_and_is_no_event(r
     assert first.curve.value[3] == pytest.approx(20.0, abs=1.0)
 
 
+def test_a_size_beside_what_runs_differ_by_is_that_beside_it_in_the_model():
+    """Where a path in time stood for it, an order of 20 arcsec was 27 +- 5."""
+    pulls, theta = [], np.arange(60) * 6.0
+    for seed in range(10):
+        rng, runs = np.random.default_rng([4912, seed]), []
+        for _ in range(4):
+            own, at = 60.0 + 25.0 * rng.standard_normal(), 40.0 + 20.0 * rng.standard_normal()
+            error = own * np.cos(np.radians(theta - at)) + 20.0 * np.cos(np.radians(2.0 * theta))
+            error += NOISE * rng.standard_normal(60)
+            runs.append(
+                ta.CalibrationRun(theta, theta + error / 3600.0, period=360.0, time=0.05 * theta)
+            )
+        for finding in ta.diagnose(runs, EMPTY, gain=False).findings:
+            if finding.confirmed and finding.parameters["order"].value == 2.0:
+                size = finding.parameters["amplitude_arcsec"]
+                pulls.append((size.value - 20.0) / size.std)
+                assert size.std < 0.5
+    assert len(pulls) >= 7
+    assert np.sqrt(np.mean(np.square(pulls))) < 1.6
+
+
 def test_what_one_speed_cannot_tell_is_stated_together(rng):
     runs = measured(rng, lambda theta, d, *_: 4.0 * d, speeds=(20.0,), repeats=4)
     found = ta.diagnose(runs, EMPTY)
