@@ -130,7 +130,8 @@ def remeasured_findings(
         if finding.confirmed and finding.group and {*finding.group} <= {*kept}:
             group = [kept.index(k) for k in finding.group]
             parameters, effects = _reported(less, less, group, [])
-            finding = replace(finding, parameters=finding.parameters | parameters, effects=effects)
+            sizes = {name: size for name, size in parameters.items() if size.std is not None}
+            finding = replace(finding, parameters=finding.parameters | sizes, effects=effects)
         found.append(finding)
     return found
 

@@ -107,9 +107,10 @@ def looked_at_stride(runs: Sequence[CalibrationRun]) -> int:
 
 
 def _about(columns: Array, weight: Array) -> Array:
-    """Columns about their weighted mean, by the roots of the weights."""
-    mean = (weight @ columns) / weight.sum()
-    return np.asarray(np.sqrt(weight)[:, None] * (columns - mean))
+    """Columns about their weighted mean, by the roots of the weights; rounding is none of it."""
+    about = columns - (weight @ columns) / weight.sum()
+    is_rounding = np.abs(about).max(axis=0) <= 1e-9 * np.abs(columns).max(axis=0)
+    return np.asarray(np.sqrt(weight)[:, None] * np.where(is_rounding, 0.0, about))
 
 
 def _of_run(own: Array, index: int, runs: int) -> Array:

@@ -33,7 +33,8 @@ _MISSING: Final = {
     "ramp": "nuisance 'ramp' needs travel",
     "direction": "nuisance 'direction' needs runs that reverse: one in a single direction "
     "has it in its zero",
-    "velocity": "nuisance 'velocity' needs time or velocity in every run, and different speeds",
+    "velocity": "nuisance 'velocity' needs time or velocity in every run, and runs that change "
+    "their speed: one at a single speed has it in its zero",
     "drift": "nuisance 'drift' needs time in every run (at most 24 runs)",
 }
 

@@ -234,10 +234,10 @@ def _names(
     found: list[str] = []
 
     def visit(name: str | bytes, item: Any) -> None:
-        if isinstance(name, bytes):  # it is not a text, and cannot be requested
-            return
-        if isinstance(item, h5py.Dataset) and item.ndim and is_wanted(item):
-            found.append(name)
+        # A name of bytes is not a text, and cannot be requested.
+        is_named = isinstance(name, str) and isinstance(item, h5py.Dataset)
+        if is_named and item.ndim and is_wanted(item):
+            found.append(str(name))
 
     file.visititems(visit)
     return found

@@ -108,11 +108,6 @@ class FactorAccount:
         return float(np.var(self.columns[:, own] @ mean[own]))
 
     @cached_property
-    def bounds(self) -> Array:
-        """First column of each group, and the one past the last."""
-        return np.cumsum([0, *(group.columns.shape[1] for group in self.groups)])
-
-    @cached_property
     def columns(self) -> Array:
         """Those of all groups."""
         return np.hstack([group.columns for group in self.groups])
@@ -248,11 +243,10 @@ def factors_of(
             continue
         shaft = _shaft(group.orders, shafts) if group.orders or group.jump is not None else None
         kinds.setdefault((group.factor, shaft), []).append(k)
-    bounds = account.bounds
     found = []
     for (factor, shaft), members in kinds.items():
         groups = [account.groups[k] for k in members]
-        means = [mean[bounds[k] : bounds[k + 1]] for k in members]
+        means = [mean[account.columns_of([k])] for k in members]
         at = account.columns_of(members)
         columns = account.columns[:, at]
         fitted = columns @ mean[at]
@@ -285,10 +279,9 @@ def factors_of(
 
 def _with_constants(account: FactorAccount, mean: Array, named: Container[float]) -> FactorAccount:
     """Lines of the place that are what products with them are on average, as parts of these."""
-    groups, bounds = list(account.groups), account.bounds
+    groups = list(account.groups)
     sizes = {
-        k: float(np.var(groups[k].columns @ mean[bounds[k] : bounds[k + 1]]))
-        for k in account.inside
+        k: float(np.var(groups[k].columns @ mean[account.columns_of([k])])) for k in account.inside
     }
     for k in account.inside:
         products = [j for j in account.inside if groups[j].is_of_line(account.groups[k].orders)]
