@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ..effects.ambiguity import Ambiguity
+from ..effects.effect import title_of
 from ..effects.missing_order import MissingOrder
 from ..support.display_units import ErrorsIn, ErrorUnit, brief_number, error_unit, sine_of_rms
 from ..support.layout import counted, laid_out
@@ -130,6 +131,12 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed]
     if named:
         yield f"{sure}: {_by_cause(named)}.", 2, 0
+    shared = [spot for spot in diagnosis.not_identifiable if spot.supported and spot.common]
+    other = ((s.common, title_of(c)) for s in shared for c in s.causes if c != s.common)
+    for common, each in _grouped(other).items():
+        causes = " or ".join(dict.fromkeys(each))
+        name = title_of(common).capitalize()
+        yield f"{name} may also be {causes}: these runs do not distinguish them.", 2, 0
     lacking = () if diagnosis.torque is None else diagnosis.torque.findings
     torque = "; ".join(f.summary() for f in lacking if f.confirmed)
     if torque:
