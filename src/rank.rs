@@ -62,7 +62,7 @@ pub fn check<I: Iterator<Item = f64>>(
         let fewer = match (distinct - 1) / 2 {
             0 => String::new(),
             1 => "fit 1 order, or ".into(),
-            most => format!("fit at most {most} orders, or "),
+            most => format!("fit {most} or fewer of the orders, or "),
         };
         let reason = format!(
             "readings at {distinct} distinct angle{} cannot determine {}; \
@@ -75,8 +75,8 @@ pub fn check<I: Iterator<Item = f64>>(
         let all: Vec<_> = (0..design.columns()).collect();
         let orders = orders_of(design, if lost.is_empty() { &all } else { &lost });
         let reason = format!(
-            "the angles read cover too little of a turn to determine {} (condition number \
-             {condition:.1e}); fit fewer orders, give a ridge, or measure over more travel",
+            "the angles read cover too little of a turn to determine {}; fit fewer orders, or \
+             measure over more travel",
             name(design, &orders)
         );
         (orders, reason)

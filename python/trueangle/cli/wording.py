@@ -238,7 +238,7 @@ def _words(error: TrueAngleError, args: argparse.Namespace, build: _Build) -> li
         # The model to extend needs it; a new one holds what these readings show.
         return _again(build, args, command, (), _named_outputs(args), without=("model",))
     if command not in ("fit", "orders"):
-        return _plan(error, args) if command == "selfcal" else []
+        return _plan(error, args) if command == "selfcal" and args.method != "channels" else []
     if isinstance(error, RankError):
         return _again(build, args, "orders", (), (), without=("orders",))
     if isinstance(error, NoModelError) and "plan_arc" not in str(error):  # the error has it

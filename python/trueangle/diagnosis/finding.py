@@ -10,7 +10,7 @@ from ..effects import EFFECTS, Effect
 from ..effects.effect import title_of
 from ..estimation.quantity import Parameters, Quantity
 from ..support.display_units import ErrorUnit, error_unit, sine_of_rms
-from ..support.layout import wrapped_lines
+from ..support.layout import run_name, wrapped_lines
 from ..support.plainresult import ShownResult, plain_fields
 from .confirmation import CONFIRMED
 from .gain import Gain
@@ -231,7 +231,7 @@ def _number(value: Any, std: Any, of: ErrorUnit) -> str:
     if isinstance(value, float) and not (of is _PLAIN and value.is_integer()):
         return of.number(value)
     text = f"{value:.0f}" if isinstance(value, float) else str(value)
-    return " ".join(map(str, value)) if isinstance(value, list) else text  # a run and a row
+    return f"{value[1]} of {run_name(value[0])}" if isinstance(value, list) else text
 
 
 def brief_finding(finding: Finding, unit: ErrorUnit) -> str:

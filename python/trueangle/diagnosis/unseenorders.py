@@ -102,8 +102,8 @@ def arc_note(regression: Regression) -> str:
         return ""
     turns = _turns(regression)
     return (
-        f"{turns:.2g} turns are too few to separate a ramp from low orders: the "
-        "fewest that explain the readings are named, and their errors allow for the others"
+        f"{turns:.2g} turns are too few to separate a ramp from low orders: the smallest set of "
+        "orders that fits is given, and its +- includes this doubt"
     )
 
 

@@ -267,12 +267,12 @@ class Comparison(PlainResult):
             return [f"Difference {size}; not tested: that needs the covariance of both models."]
         a, b = (std or 0.0 for std in self.each_std_arcsec)
         first = f"No significant difference: {size}."
-        use = f"Use {'BA'[a <= b]}, the more certain one."
+        use = "Use either." if a == b else f"Use {'BA'[a < b]}, the more certain one."
         if self.verdict == "changed":
             first = f"Changed: {'; '.join([*self._moved(unit), size])}."
             # Where the difference is less than what either is uncertain by, that one is no judge.
             if max(a, b) < self.rms_arcsec:
-                use = "Which is right now: trueangle watch READINGS -m A, then B."
+                use = "To see which one fits today: trueangle watch READINGS -m A, then B."
         known = f"Standard error over the turn: {unit.text(a)} rms of A, {unit.text(b)} of B."
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
         p = f"p {p}: probability of such a difference if only noise differs; a change is reported"

@@ -176,7 +176,7 @@ class FitData(PlainResult):
             return () if self._summed is None else self._summed.outliers
         return tuple(
             (run.label or str(i), int(row))
-            for i, (run, weights) in enumerate(zip(self.runs, self.weights, strict=True))
+            for i, (run, weights) in enumerate(zip(self.runs, self.weights, strict=True), 1)
             for row in np.flatnonzero(
                 (weights == 0.0) & (True if run.weights is None else run.weights > 0.0)
             )

@@ -89,10 +89,10 @@ def check_new_run(estimate: EvidenceEstimate, travel: Array) -> None:
     # Standard deviations between runs by which the gain of a further one must exceed nothing.
     if gain <= 2.0 * spread:
         orders = ", ".join(f"{order:g}" for order in estimate.differing[:6])
+        average = ", ".join(f"{order:g}" for order in estimate.present)
         raise NoModelError(
-            f"no correction can be given: order {orders} is not the same in all "
-            "runs, and a correction may make a new run worse. Where the runs are of different "
-            "joints, fit each separately; of one joint, give the orders: `orders=[1, 2]`"
+            f"no model: order {orders} changes between the runs, so a new run may get worse. Fit "
+            f"different joints separately; to fit the average anyway: `orders=[{average}]`"
         )
 
 

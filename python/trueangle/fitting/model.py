@@ -75,11 +75,9 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
             "patterns of this size, on average over the travel."
         )
     if weighted.wild:
-        rows = ", ".join(
-            f"reading {row + 1} of {run_name(label)}" for label, row in sorted(fit.wild)[:3]
-        )
-        rows += ", ..." * (weighted.wild > 3)
-        yield f"{counted(weighted.wild, 'outlier')} rejected: {rows}."
+        rows = [f"reading {row + 1} of {run_name(label)}" for label, row in sorted(fit.wild)[:3]]
+        rows += ["..."] * (weighted.wild > 3)
+        yield f"{counted(weighted.wild, 'outlier')} rejected: {', '.join(rows)}."
     errors = fit.standard_errors
     if errors is not None and errors[0].size and (fit.amplitudes < 2.0 * errors[0]).all():
         yield _undetermined(fit)
@@ -103,7 +101,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
 
 
 def _not_noise(fit: FittedCoefficients) -> Iterable[str]:
-    """What runs differ by, where it is most of the residual: no order holds it, and no noise."""
+    """What is neither in the model nor noise of readings, where it is most of the residual."""
     estimate = None if fit.evidence is None else fit.evidence.estimate
     if estimate is None or len(fit.problem.runs) == 1:
         return
@@ -113,8 +111,8 @@ def _not_noise(fit: FittedCoefficients) -> Iterable[str]:
     # A millionth of the error is rounding, of which an estimate knows no more.
     if left > max(noise, 1e-12 * fit.rms_before**2):
         yield (
-            f"Not corrected: {rms_text(math.sqrt(left), fit.problem.period)}, which differs from "
-            "run to run and is no noise of single readings. Run diagnose for its cause."
+            f"Not corrected: {rms_text(math.sqrt(left), fit.problem.period)}, which is not "
+            "random noise. Run diagnose for its cause."
         )
 
 

@@ -82,7 +82,7 @@ class Nuisance:
         """What was taken out, for the notes."""
         words = {
             "ramp": f"a ramp of {1e6 * self.slope:.3g} ppm of the angle (a wrong scale or ratio)",
-            "direction": f"a reversal error of +-{1_296_000.0 * self.half_width / period:.3g} "
+            "direction": f"a reversal error of +-{1_296_000.0 * abs(self.half_width) / period:.3g} "
             "arcsec with the direction",
             "velocity": f"an error of {1e3 * self.delay:.3g} ms times the velocity (a delay)",
             "drift": f"a drift in time (cubic spline of {self.intervals} "

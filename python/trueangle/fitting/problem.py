@@ -73,9 +73,8 @@ class SolvedProblem:
         except ArgumentError:
             # Orders that all but cancel: coefficients beyond what any series may have.
             raise RankError(
-                f"the angles read cover too little of a turn to determine {self._named()} "
-                f"(condition number {solution.condition_number:.3g}); fit fewer orders, give a "
-                "ridge, or measure over more travel",
+                f"the angles read cover too little of a turn to determine {self._named()}; "
+                "fit fewer orders, or measure over more travel",
                 [(i, order) for i, shaft in enumerate(shafts) for order in shaft.orders],
             ) from None
 

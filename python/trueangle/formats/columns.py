@@ -19,6 +19,7 @@ from ..support.roles import (
     role_code,
     role_kind,
     unit_in_name,
+    unknown_unit,
     wanted_unit,
 )
 from ..support.signals import SIGNALS, find_signal
@@ -72,6 +73,9 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
     """
     found = {}
     for role, (name, unit) in wanted.items():
+        of_unit, _, ending = name.rpartition(":")
+        if name not in header and of_unit in header:
+            raise FileError(path, unknown_unit(ending, role), line=1, column=of_unit)
         column, is_reversed = signed_name(path, header, name)
         found[role] = RoleColumn(
             role, column, unit or unit_in_name(column, role), True, is_reversed

@@ -186,15 +186,17 @@ class CalibrationPlan(PlainResult):
             one = self.kind.removesuffix("s")
             lines = [f"{counted(offsets, one)} of {self.positions} positions: {total}"]
             for k, (at, turned) in enumerate(zip(offsets, self.facet_shifts, strict=True), 1):
-                lines.append(f"  {one} {k}: from {at} deg on, reference turned by {turned} faces")
-            tolerance = f"{self.tolerance_deg:.2g} deg for the first position; record 0.01 deg"
-            lines.append(f"  tolerance              {tolerance}")
+                turn = f", turn the polygon by {counted(turned, 'face')}" if turned else ""
+                lines.append(f"  {one} {k}: start at {at} deg{turn}")
+            if self.tolerance_deg:
+                start = f"start within +-{self.tolerance_deg:.2g} deg; note the angle to 0.01 deg"
+                lines.append(f"  tolerance              {start}")
         lines += [f"  note: {note}" for note in self.notes]
         lines.append(_worst(self.worst_noise_factor))
         if math.isfinite(self.facet_noise_factor):
             # The attribute is relative to one mount, the ideal to as many readings.
             fitted = math.sqrt(len(self.mount_offsets_deg)) * self.facet_noise_factor
-            lines.append(f"  reference fitted too   standard error {fitted:.2f} times the ideal")
+            lines.append(f"  polygon not calibrated standard error {fitted:.2f} times the ideal")
         lines += [_FACTOR, *factor_table(self.noise_factors)]
         return laid_out(lines)
 

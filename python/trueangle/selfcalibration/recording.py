@@ -102,7 +102,7 @@ class Recording:
             values = getattr(self, role)
             if values is None:
                 code = role_code(role, unit=None)
-                raise NoModelError(f"{self.named}: no column {role}: name the channel with {code}")
+                raise NoModelError(f"{self.named}: no column {role}: record it, or name it: {code}")
             found.append(values)
         return found
 

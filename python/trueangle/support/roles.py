@@ -163,14 +163,27 @@ def wanted_unit(text: str, role: str) -> str | None:
     ('rad', None)
     """
     unit = _SPELLINGS.get(text.strip().lower(), text.strip())
+    return next((u for u in _units(role) if u == unit or u.lower() == unit.lower()), None)
+
+
+def unknown_unit(text: str, role: str) -> str:
+    """That ``text`` is no unit of a role, and those that are.
+
+    Examples
+    --------
+    >>> unknown_unit("grad", "time")
+    "unit 'grad' is not known; use s, ms, us, ns"
+    """
+    return f"unit {text!r} is not known; use {', '.join(_units(role)) or 'none'}"
+
+
+def _units(role: str) -> Sequence[str]:
     units: Mapping[str, Sequence[str]] = {
-        "angle": (*ANGLE_UNITS, "count"),
+        "angle": ("deg", "rad", "turn", "count", "arcsec", "arcmin"),
         "time": tuple(TIME_UNITS),
         "velocity": ("deg/s", "rad/s", "turn/s", "count/s"),
-        "plain": tuple(PLAIN_UNITS.get(role, ())),
-        "label": (),
     }
-    return next((u for u in units[role_kind(role)] if u == unit or u.lower() == unit.lower()), None)
+    return units.get(role_kind(role), tuple(PLAIN_UNITS.get(role, ())))
 
 
 def unit_in_name(name: str, role: str) -> str | None:
@@ -220,7 +233,7 @@ def wanted_columns(signals: Mapping[str, Any] | None) -> dict[str, tuple[str, st
             )
         known = None if unit is None else wanted_unit(unit, role)
         if unit is not None and known is None:
-            raise ArgumentError(f"signals[{role!r}]: {unit!r} is not a unit of this role")
+            raise ArgumentError(f"signals[{role!r}]: {unknown_unit(unit, role)}")
         found[role] = (name, known)
     return found
 

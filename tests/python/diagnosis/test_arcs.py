@@ -46,7 +46,7 @@ def test_what_is_confirmed_is_as_uncertain_as_it_is_wrong(turns, orders, scale):
         runs, lines = swept(rng, turns, orders, scale)
         result = ta.diagnose(runs, BELIEVED, within=60.0)
         lines_named = any(f.cause == "missing_order" for f in result.findings)
-        told = any("the fewest that explain" in note for note in result.notes)
+        told = any("smallest set of orders that fits" in note for note in result.notes)
         assert told == (turns < 0.9 and lines_named)
         for finding in result.findings:
             given = finding.parameters

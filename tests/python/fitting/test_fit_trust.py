@@ -248,7 +248,7 @@ def test_coefficients_beyond_any_series_are_told_as_orders_that_cancel():
     """Eleven orders on 100 degrees, and readings that alternate: 1e13 degrees of an order."""
     x = np.linspace(10.0, 110.0, 200)
     run = ta.CalibrationRun(x, x + 80.0 * np.cos(np.pi * np.arange(200) / 8.0), 360.0)
-    with pytest.raises(RankError, match="give a ridge, or measure over more travel") as refused:
+    with pytest.raises(RankError, match="fit fewer orders, or measure over more travel") as refused:
         ta.fit(run, orders=range(1, 12), loss="linear")
     assert "orders 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 of output" in str(refused.value)
     assert refused.value.orders[0] == (0, 1)

@@ -230,7 +230,7 @@ def test_named_units_are_converted(unit, tmp_path):
     [
         ({"reference": "posact"}, r"did you mean 'pos act \[rad\]'"),
         ({"refrence": "x"}, "did you mean reference"),
-        ({"reference": ("pos act", "parsec")}, "not a unit"),
+        ({"reference": ("pos act", "parsec")}, "use deg, rad, turn, count, "),
         ({"reference": "pos"}, "no such column"),
         ({"reference": 3}, "must be the name"),
     ],

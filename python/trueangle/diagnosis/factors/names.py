@@ -261,7 +261,7 @@ def _followed(names: NamedForms, other: Sequence[float], tau: Sequence[float]) -
     new = [k for k in own if tau[k] == 0.0] or own
     factors = dict.fromkeys(names.account.groups[k].factor for k in new)
     words = " and ".join(WORDS[factor] for factor in factors)
-    return f"a free function of {words}" if words else "noise alone"
+    return f"an error that depends on {words}" if words else "noise alone"
 
 
 def confirmed_names(names: NamedForms, findings: Sequence[Finding]) -> list[int]:

@@ -16,6 +16,7 @@ from ...estimation.rounded import fit_rounded, is_rounding_visible
 from ...joint.gear import HIGHEST_LOW_ORDER
 from ...model.validity import greatest_slope
 from ...runs.aliasing import Positions
+from ...runs.checks.record import FEW
 from ...runs.run import CalibrationRun
 from ...support.angles import arcsec
 from ...support.arrays import Array
@@ -129,9 +130,6 @@ def lines_in_time(
     )
     return set(tested) - {k for k, size in zip(orders, found[1], strict=False) if size > 0.0}
 
-
-#: Readings from which a choice among orders is sound: fewer are refused with a plan.
-FEW: Final = 20
 
 #: Probability, over the whole search, of an order made by a coarse sensor's rounding alone.
 FALSE_ALARM: Final = 0.005
@@ -355,10 +353,8 @@ class EvidenceSelection:
                 f"{len(self.units) + 3} readings, a search for orders needs {FEW}; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
-        count = len(self.orders)
-        beside = (
-            f"order {best.order:g}, the {f'likeliest of {count}' if count > 1 else 'only one'},"
-        )
+        likeliest = f"likeliest of {len(self.orders)}" if len(self.orders) > 1 else "only one"
+        beside = f"order {best.order:g}, the {likeliest},"
         if best.verdict == "reference":
             return "the only significant orders are the reference's own"
         if best.verdict not in ("noise", "alias"):

@@ -164,11 +164,7 @@ def selection_notes(
     closure = closure_errors(runs)
     if closure.size:
         worst = arcsec(float(np.abs(closure).max()), selection.period)
-        count = f"{closure.size} run{'s' if closure.size > 1 else ''}"
-        notes.append(
-            f"closure: the last reading repeats the first position in {count}, and differs by "
-            f"{worst:.3g} arcsec at most"
-        )
+        notes.append(f"after whole turns the error has changed by up to {worst:.3g} arcsec")
     if selection.estimate is not None:
         notes += drift_of_a_sweep(runs, selection.estimate)
     retained = [row for row in selection.table if row.retained]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from ..readings import FileReadings
 from ..run import CalibrationRun
 from ..source import checked_reading_options
 from .fault import DataFault
+
+#: Readings from which a choice among orders is sound: fewer are refused with a plan.
+FEW: Final = 20
 
 #: Readings that a run must have to be compared as a whole, and a level to be more than noise.
 LEAST_READINGS = 3

@@ -14,7 +14,7 @@ from ...support.plainresult import PlainResult, plain_fields
 from ..outliers import FEWEST
 from .angles import BLOCKS
 from .fault import DataFault
-from .record import LEAST_READINGS, Record
+from .record import FEW, LEAST_READINGS, Record
 
 #: Levels are apart by so much at least: Nm, kelvin, degrees; of speeds a share of the fastest.
 _LEAST_GAP = {"torque": 0.05, "temperature": 1.0, "mount": 0.5, "speed": 0.05}
@@ -146,7 +146,8 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
         can.append("how far the zero and the pattern repeat from run to run")
     else:
         no(REPEATABILITY, counted(extent.runs, "run"), "more runs")
-    return can, cannot
+    # An order and the zeros are fitted, with one reading to spare.
+    return can * (extent.readings > extent.runs + 2), cannot
 
 
 def _usual_speeds(records: list[Record]) -> Iterator[float]:
@@ -283,7 +284,9 @@ class Check(PlainResult):
         found = counted(self.data_faults, "fault")
         lines = [f"{found}; the data {'can' if self.usable else 'must not'} be used as they are."]
         if not self.data_faults:
-            lines = ["No fault found in the data; next: `ta.fit(...)` or `ta.diagnose(...)`."]
+            then = "next: `ta.fit(...)` or `ta.diagnose(...)`"
+            few = f"too few readings to fit an order: take {FEW} or more"
+            lines = [f"No fault found in the data; {then if self.can else few}."]
         for fault in self.data_faults:
             lines += wrapped_lines(f"{fault.fault}: {fault.says}.", 2)
             lines += wrapped_lines(f"Remedy: {fault.mend}.", 4, 2)
@@ -309,7 +312,7 @@ class Check(PlainResult):
             "; ".join(filter(None, levels)) + ".",
             "",
         ]
-        lines += wrapped_lines(f"Identifiable: {'; '.join(self.can)}.", 2)
+        lines += wrapped_lines(f"Identifiable: {'; '.join(self.can) or 'nothing'}.", 2)
         lines += ["Not identifiable, and what would show it:"] if self.cannot else []
         for entry in self.cannot:
             text = f"- {entry['what']} ({entry['because']}): {entry['measure']}"
