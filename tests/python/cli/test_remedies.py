@@ -244,7 +244,7 @@ def three() -> list[ta.CalibrationRun]:
 REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str, str]] = {
     "no order": (noise, ["fit", "R", "-o", "m.json"], "no order is above the noise", "diagnose"),
     "no order, few readings": (few, ["fit", "R", "-o", "m.json"], "take 20 readings", "plan"),
-    "no order, 3 readings": (three, ["fit", "R", "-o", "m.json"], "1 order and 1 zero need 4 readings", "plan"),
+    "no order, 3 readings": (three, ["fit", "R", "-o", "m.json"], "1 zero need 4 readings", "plan"),
     "no order, a gear": (
         noise,
         ["fit", "R", "-o", "m.json", "--gear-ratio", "50.5", "--fixed-member", "none"],

@@ -285,8 +285,8 @@ class Check(PlainResult):
         lines = [f"{found}; the data {'can' if self.usable else 'must not'} be used as they are."]
         if not self.data_faults:
             then = "next: `ta.fit(...)` or `ta.diagnose(...)`"
-            few = f"too few readings to fit an order: take {FEW} or more"
-            lines = [f"No fault found in the data; {then if self.can else few}."]
+            few = f"a search for orders needs {FEW} readings (here {e.readings})"
+            lines = [f"No fault found in the data; {few if e.readings < FEW else then}."]
         for fault in self.data_faults:
             lines += wrapped_lines(f"{fault.fault}: {fault.says}.", 2)
             lines += wrapped_lines(f"Remedy: {fault.mend}.", 4, 2)
