@@ -7,8 +7,15 @@
 //! q = X_k' C^-1 r,    s = X_k' C^-1 X_k - X_k' C^-1 X S X' C^-1 X_k
 //! ```
 //!
-//! with the zero of each run taken out. Effects of runs are left out of account. For an order that is
-//! in, with prior variance `tau`, the same without it follows from its own posterior:
+//! with the zero of each run taken out, and its effects: of columns `Z` of variances `W²` (Woodbury,
+//! run by run)
+//!
+//! ```text
+//! C^-1 - C^-1 Z W (I + W Z' C^-1 Z W)^-1 W Z' C^-1
+//! ```
+//!
+//! in the place of `C^-1`. For an order that is in, with prior variance `tau`, the same without it
+//! follows from its own posterior:
 //!
 //! ```text
 //! s = S_kk^-1 - I / tau,    q = S_kk^-1 b_k
@@ -17,6 +24,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::gains::Candidate;
+use super::model::Effects;
 use super::readings::{Readings, Run};
 use super::rows::Rows;
 use super::whitening::{Factor, Noise, State};
@@ -25,9 +33,11 @@ use crate::{interrupt, threads};
 /// Orders whose columns are made at once: what a whitening carries on stays in the first cache.
 const ORDERS: usize = 128;
 
-/// The columns that are in, as places of orders, with their posterior.
+/// The columns that are in, as places of orders, with their posterior; then those of orders that only
+/// differ from run to run. `omega` is of all of these.
 pub(super) struct Inside<'a> {
     pub places: &'a [usize],
+    pub omega: &'a [f64],
     pub tau: &'a [f64],
     pub mean: &'a [f64],
     pub covariance: &'a DMatrix<f64>,
@@ -36,7 +46,8 @@ pub(super) struct Inside<'a> {
 impl Inside<'_> {
     /// The order at a place that is in, beside the others.
     fn without(&self, place: usize) -> Option<Candidate> {
-        let at = self.places.iter().position(|&own| own == place)?;
+        let active = &self.places[..self.tau.len()];
+        let at = active.iter().position(|&own| own == place)?;
         let precision = self.covariance.view((2 * at, 2 * at), (2, 2)).into_owned();
         let precision = precision.try_inverse()?;
         let mean = &self.mean[2 * at..][..2];
@@ -52,6 +63,13 @@ struct Part {
     squares: Vec<f64>,
 }
 
+/// Effects of a run, and what they take of the columns that are in and of the residual.
+struct Taken {
+    effects: Effects,
+    inside: DMatrix<f64>,
+    residual: DMatrix<f64>,
+}
+
 impl Readings {
     /// Of all orders, beside those that are in; of an order that is in, beside the others.
     pub(super) fn candidates(&self, noise: Noise, inside: &Inside) -> Vec<Candidate> {
@@ -61,31 +79,73 @@ impl Readings {
         let work = |r: usize| own.alone(&self.runs()[r], noise, inside.mean, &some);
         let runs = threads::map_parts(self.runs().len(), self.threads(), work);
         let runs: Vec<Vec<Part>> = runs.collect();
+        let place = |k: usize| (k / ORDERS, 2 * (k % ORDERS) + 1);
+        let (m, last) = (inside.mean.len(), own.columns() - 1);
+        // Product of a row (1 of the first column) with a column, about the zero of the run.
+        let left = |run: &[Part], i: usize, part: usize, c: usize| {
+            let stride = Rows::width(some[part].columns());
+            let (zero, row) = (
+                &run[part].products[..stride],
+                &run[part].products[i * stride..],
+            );
+            row[c] - row[0] * zero[c] / zero[0]
+        };
+        let differ: Vec<usize> = (0..inside.places.len())
+            .filter(|&own| inside.omega[own] > 0.0)
+            .flat_map(|own| [2 * own, 2 * own + 1])
+            .collect();
+        let effects: Vec<Option<Taken>> = runs
+            .iter()
+            .map(|run| {
+                let with = |i: usize, c: usize| {
+                    let (part, first) = place(inside.places[c / 2]);
+                    left(run, i, part, first + c % 2)
+                };
+                let of = |rows: usize, row: &dyn Fn(usize) -> usize| {
+                    DMatrix::from_fn(differ.len(), rows, |i, k| with(row(k), differ[i]))
+                };
+                let products = of(differ.len(), &|k| differ[k] + 1);
+                let omega: Vec<f64> = differ.iter().map(|&c| inside.omega[c / 2]).collect();
+                let on: Vec<usize> = (0..differ.len()).collect();
+                let effects = Effects::of(&products, &omega, &on)?;
+                let inside = effects.whitened(of(m, &|k| k + 1));
+                let residual = effects.whitened(of(1, &|_| last));
+                Some(Taken {
+                    effects,
+                    inside,
+                    residual,
+                })
+            })
+            .collect();
         let each = all.iter().map(|&k| {
             if let Some(own) = inside.without(k) {
                 return own;
             }
-            let (part, c) = (k / ORDERS, 2 * (k % ORDERS) + 1);
+            let (part, c) = place(k);
             let stride = Rows::width(some[part].columns());
-            let m = inside.mean.len();
             let (mut s, mut q) = (DMatrix::zeros(2, 2), DVector::zeros(2));
             let mut reach = DMatrix::zeros(m, 2);
-            for run in &runs {
+            for (run, taken) in runs.iter().zip(&effects) {
                 let Part { products, squares } = &run[part];
                 let zero = &products[..stride];
-                let left = |i: usize, c: usize| {
-                    let row = &products[i * stride..];
-                    row[c] - row[0] * zero[c] / zero[0]
-                };
                 for i in 0..2 {
                     for j in 0..2 {
                         let square = squares[(i ^ j) * stride + c + i * j];
                         s[(i, j)] += square - zero[c + i] * zero[c + j] / zero[0];
                     }
-                    q[i] += left(m + 1, c + i);
+                    q[i] += left(run, last, part, c + i);
                     for own in 0..m {
-                        reach[(own, i)] += left(own + 1, c + i);
+                        reach[(own, i)] += left(run, own + 1, part, c + i);
                     }
+                }
+                if let Some(taken) = taken.as_ref().filter(|_| !differ.is_empty()) {
+                    let own = |i: usize, j: usize| left(run, differ[i] + 1, part, c + j);
+                    let x = taken
+                        .effects
+                        .whitened(DMatrix::from_fn(differ.len(), 2, own));
+                    s -= x.tr_mul(&x);
+                    q -= x.tr_mul(&taken.residual).column(0);
+                    reach -= taken.inside.tr_mul(&x);
                 }
             }
             Candidate::new(s - reach.tr_mul(&(inside.covariance * &reach)), q)

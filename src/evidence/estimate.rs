@@ -198,8 +198,11 @@ impl Readings {
             }
             let posterior = best.posterior(&grams)?;
             let active = best.active();
+            let only_differ = (0..looked.len()).filter(|&k| best.has(k) && best.tau[k] == 0.0);
+            let every: Vec<usize> = active.iter().copied().chain(only_differ).collect();
             let inside = Inside {
-                places: &active.iter().map(|&k| looked[k]).collect::<Vec<_>>(),
+                places: &every.iter().map(|&k| looked[k]).collect::<Vec<_>>(),
+                omega: &every.iter().map(|&k| best.omega[k]).collect::<Vec<_>>(),
                 tau: &active.iter().map(|&k| best.tau[k]).collect::<Vec<_>>(),
                 mean: posterior.mean.as_slice(),
                 covariance: &posterior.covariance(),
@@ -234,6 +237,7 @@ impl Readings {
         let white = Noise::of([total, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let inside = Inside {
             places: &[],
+            omega: &[],
             tau: &[],
             mean: &[],
             covariance: &DMatrix::zeros(0, 0),

@@ -226,7 +226,7 @@ impl Total {
         if !on.is_empty() {
             // With `E` the effects: mean b + E (g - G b), covariance
             // E + (I - E G) S (I - E G)'.
-            let effects = Effects::of(&gram.sums, &omega, &on)?;
+            let effects = Effects::of(&gram.sums.products, &omega, &on)?;
             let root = effects.whitened(DMatrix::identity(on.len(), on.len()));
             let inner = root.tr_mul(&root);
             let mut spread = DMatrix::zeros(m, m);

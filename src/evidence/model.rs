@@ -128,7 +128,7 @@ impl Sums {
         if on.is_empty() {
             return;
         }
-        let Some(effects) = Effects::of(self, omega, &on) else {
+        let Some(effects) = Effects::of(&self.products, omega, &on) else {
             total.log_scale = f64::NAN;
             return;
         };
@@ -149,11 +149,11 @@ pub(super) struct Effects {
 
 impl Effects {
     /// Of columns `on`.
-    pub(super) fn of(sums: &Sums, omega: &[f64], on: &[usize]) -> Option<Self> {
+    pub(super) fn of(products: &DMatrix<f64>, omega: &[f64], on: &[usize]) -> Option<Self> {
         let roots: Vec<f64> = on.iter().map(|&c| omega[c].sqrt()).collect();
         let inner = DMatrix::from_fn(on.len(), on.len(), |i, k| {
             let unit = if i == k { 1.0 } else { 0.0 };
-            unit + roots[i] * sums.products[(on[i], on[k])] * roots[k]
+            unit + roots[i] * products[(on[i], on[k])] * roots[k]
         });
         let lower = Cholesky::new(inner)?.unpack();
         Some(Self { lower, roots })

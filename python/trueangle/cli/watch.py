@@ -156,6 +156,6 @@ def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace)
     change = f"change {window.statistic:.2f}, alarm from {window.limit:.2f}"
     if window.window <= Monitor.BASELINE:
         change = f"baseline {window.window} of {Monitor.BASELINE}"
-    text = f"window {window.window:5d}  order {largest.order:g} differs from the model by "
+    text = f"window {window.window:5d}  order {largest.order:g} is off by "
     text += f"{shown.text(size)}; {change}"
     return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else text

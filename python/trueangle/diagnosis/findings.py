@@ -121,7 +121,7 @@ def remeasured_findings(
     columns, covariance : ndarray
         Of the free functions.
     """
-    less = with_unseen_orders(with_form_errors(less))
+    less = with_form_errors(less)
     shift = less.back @ (less.q.T @ less.whiten(columns))
     before = 0.0 if less.form_errors is None else less.form_errors
     less = replace(less, form_errors=before + shift @ covariance @ shift.T)

@@ -22,6 +22,7 @@ from .holdout import rebuilt_term
 from .penalty import regression_without, total_penalty
 from .remainder import free_paths, unexplained_remainder
 from .selection import select_again
+from .unseenorders import arc_note
 
 #: Share of the work that the names may take, with all before them.
 FOR_FINDINGS = 0.92
@@ -224,9 +225,10 @@ def _named(
     factors = [f if any(f is other for other in kept) else replace(f, effects=()) for f in factors]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
-    # A function that may be another factor's is no ground for narrower errors.
+    # A function that may be another factor's is no ground for narrower errors, and over an arc
+    # sizes are of a mixture over all low orders (`with_unseen_orders`).
     is_open = any(f.not_distinguished_from for f in factors if not f.named_by)
-    if beyond is not None and not is_open:
+    if beyond is not None and not (is_open or arc_note(chosen)):
         function, columns, covariance = beyond
         sure = {k for finding in held if finding.confirmed for k in finding.group}
         effects = [(k, term, EFFECTS[term.cause]) for k, term in enumerate(chosen.terms)]

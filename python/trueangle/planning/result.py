@@ -84,7 +84,7 @@ class ArcPlan(PlainResult):
             *place_table(self.places_deg, self.counts),
             f"  D-efficiency           {self.d_efficiency:.3f} of the best possible",
             f"  of even spacing        {self.efficiency_of_even_spacing:.3f}",
-            f"  fit with               --orders {','.join(f'{k:g}' for k in self.orders)}",
+            f"  orders to fit          {','.join(f'{k:g}' for k in self.orders)}",
             _FACTOR,
             "  order  these places  even spacing",
         ]

@@ -123,7 +123,7 @@ def test_watch(period, desk, capsys):
     command = ("watch", "w.csv", "-m", "w.json")
     told = [json.loads(line) for line in printed(capsys, *command, "--json", status=3).splitlines()]
     lines = printed(capsys, *command, "--errors-in", "mrad", status=3).splitlines()
-    pattern = r"window +(\d+)  order (\S+) differs from the model by (\S+) mrad; "
+    pattern = r"window +(\d+)  order (\S+) is off by (\S+) mrad; "
     pattern += r"(?:baseline \d of 8|change (\S+), alarm from (\S+?)(  ALARM .*)?)"
     apart = 0
     for line, one in zip(lines, told, strict=True):
