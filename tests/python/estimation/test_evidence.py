@@ -333,6 +333,21 @@ def test_one_even_run_has_no_orders_that_are_noise(correlation: float) -> None:
         assert estimate_by_evidence([run], range(1, 31)).present == (1, 2)
 
 
+def test_orders_left_out_are_scored_beside_what_runs_differ_by() -> None:
+    """Over even turns they have nothing in common with it: each is its mean over all readings."""
+    rng, theta = np.random.default_rng(483), np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False)
+    sizes = rng.normal(40.0, 30.0, 4)
+    errors = [a * np.cos(theta) + 9.0 * np.sin(2.0 * theta) for a in sizes]
+    errors = [error + rng.normal(0.0, 2.0, 360) for error in errors]
+    found = estimate_by_evidence([RunReadings(theta, error) for error in errors], range(1, 60))
+    assert found.models[0].omega[0] > 0.0
+    for order, own in zip(found.orders[2:], found.alone[2:], strict=True):
+        assert own is not None, order
+        mean = 2.0 * np.mean(errors, axis=0) @ harmonics(theta, [order]) / 360.0
+        off = mean - [own.cosine, own.sine]
+        assert np.all(np.abs(off) < 0.5 * np.sqrt([own.cosine_variance, own.sine_variance])), order
+
+
 @pytest.mark.parametrize("power", [0.5, 1.0])
 def test_errors_of_one_run_hold_in_slow_noise(power: float) -> None:
     """Whose spectrum falls with a power of the frequency: 1/f noise, and a walk."""
