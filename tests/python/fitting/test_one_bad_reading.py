@@ -75,12 +75,13 @@ def test_several_side_by_side_are_told_as_one_is(places, several, kind):
     x = 10.0 * places
     y = x + 0.02 * np.sin(np.radians(x)) + 5e-4 * np.random.default_rng(1).standard_normal(x.size)
     expected = ta.fit(ta.CalibrationRun(x, y, 360.0, label="r")).model.shafts[0].orders
-    rows = np.arange(70, 70 + several)
+    rows = np.arange(70, 70 + several * (1 + 6 * (kind == "frozen")))
     sign = np.where(rows % 2, -1.0, 1.0) if kind == "opposite" else 1.0
     y[rows] = y[69] if kind == "frozen" else y[rows] + 0.3 * sign
     fit = ta.fit(run := ta.CalibrationRun(x, y, 360.0, label="r"))
     assert fit.model.shafts[0].orders == expected
-    assert [row for _, row in sorted(fit.wild)] == rows.tolist()
+    wild, old = ([], rows.size) if kind == "frozen" else (rows.tolist(), 0)
+    assert ([row for _, row in sorted(fit.wild)], fit.readings) == (wild, y.size - old)
     (fault,) = ta.check(run).data_faults
     assert fault.fault == ("stale_samples" if kind == "frozen" else "outliers")
     assert fault.rows == tuple(rows + 1)

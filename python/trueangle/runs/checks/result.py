@@ -282,7 +282,8 @@ class Check(PlainResult):
         """The check as readable text: faults first."""
         e = self.extent
         found = counted(self.data_faults, "fault")
-        lines = [f"{found}; the data {'can' if self.usable else 'must not'} be used as they are."]
+        use = "fit accepts the data" if self.usable else "the data must not be used as they are"
+        lines = [f"{found}; {use}: see the remedy."]
         if not self.data_faults:
             then = "next: `ta.fit(...)` or `ta.diagnose(...)`"
             few = f"a search for orders needs {FEW} readings (here {e.readings})"

@@ -16,7 +16,7 @@ from ..outliers import WILD, outlying, robust_scale
 from ..run import CalibrationRun
 from .fault import REPEATS, DataFault
 from .record import LEAST_READINGS, Record, records_of
-from .still import stale_fault
+from .still import stale_fault, stuck_readings
 
 #: Readings on either side of a step that show whether it stays.
 _BESIDE: Final = 7
@@ -73,12 +73,18 @@ def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
 
 
 def parted(runs: Sequence[CalibrationRun]) -> tuple[list[CalibrationRun], list[str]]:
-    """Runs in parts before and after every loss of counts, and each loss in a sentence.
+    """Runs without old samples, in parts before and after every loss of counts, and what was done.
 
-    From there on all is off by one more unknown, as from one run to the next.
+    From a loss on all is off by one more unknown, as from one run to the next.
     """
     parts, told = [], []
-    for run, record in zip(runs, records_of(runs), strict=True):
+    for whole, read in zip(runs, records_of(runs), strict=True):
+        run, record = whole, read
+        if old := [f for f in stuck_readings([read]) if f.fault == "stale_samples"]:
+            rows = np.unique([row - 1 for fault in old for row in fault.rows])
+            run = whole.part(np.delete(np.arange(len(whole)), rows))
+            (record,) = records_of([run])
+            told += [f"{fault.says}; they are omitted" for fault in old]
         faults = list(missed_counts([record]))
         told += [f"{f.says}; the readings from there have a separate zero" for f in faults]
         starts = [fault.rows[0] - 1 for fault in faults]

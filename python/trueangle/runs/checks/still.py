@@ -70,6 +70,9 @@ class _AnglePair(NamedTuple):
 def stuck_readings(records: list[Record]) -> Iterator[DataFault]:
     """Readings that do not change while the other channel moves: at a limit, or stale."""
     for record in records:
+        read = record.reference, record.indicated
+        if not any(np.any(angle[1:] == angle[:-1]) for angle in read):
+            continue  # before they are unwrapped, which takes longer
         reference, indicated = record.unwrapped
         for name, own, other in (
             ("indicated", indicated, reference),

@@ -166,10 +166,9 @@ def test_a_joint_at_rest_repeats_nothing() -> None:
 def test_measured_data(data_dir: Path) -> None:
     found = ta.check(data_dir / "rm44_repeat.csv")
     assert [(f.fault, f.runs) for f in found.data_faults] == [("duplicate_runs", ("10", "11"))]
-    for name in ("rm44_misalignment", "resolver_stepper"):
+    # Turns of the gear pair differ by 0.7 deg at the same places: neighbours in time say so.
+    for name in ("rm44_misalignment", "resolver_stepper", "gear_pair_fit"):
         assert ta.check(data_dir / f"{name}.csv").data_faults == (), name
-    (found,) = ta.check(data_dir / "gear_pair_fit.csv").data_faults
-    assert (found.fault, found.rows) == ("outliers", (65, 76))  # 0.68 deg off their neighbours
     # One reading of the protractor is 18 deg off those around it.
     found = ta.check(data_dir / "arm_joint_protractor.csv")
     assert [(f.fault, f.rows) for f in found.data_faults] == [("outliers", (743,))]
