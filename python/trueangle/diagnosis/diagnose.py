@@ -16,7 +16,6 @@ from ..joint.signals import join_runs
 from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
-from ..runs.follows import check_usable
 from ..runs.run import CalibrationRun
 from ..runs.source import ReadingOptions
 from ..simulation.simulation import SIMULATION, Simulation
@@ -152,8 +151,6 @@ def diagnose(
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:
         raise ArgumentError("no simulation: give one, or a log as `simulated=`")
-    else:
-        check_usable(measured)
     with with_deadline(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
         stated = Simulation() if sim is None else sim
         found = _diagnosis(measured, log, stated, gain)

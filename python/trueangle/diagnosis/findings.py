@@ -125,14 +125,13 @@ def remeasured_findings(
     shift = less.back @ (less.q.T @ less.whiten(columns))
     before = 0.0 if less.form_errors is None else less.form_errors
     less = replace(less, form_errors=before + shift @ covariance @ shift.T)
-    found = []
-    for finding in findings:
+    found = list(findings)
+    for k, finding in enumerate(findings):
         if finding.confirmed and finding.group and {*finding.group} <= {*kept}:
-            group = [kept.index(k) for k in finding.group]
+            group = [kept.index(term) for term in finding.group]
             parameters, effects = _reported(less, less, group, [])
             sizes = {name: size for name, size in parameters.items() if size.std is not None}
-            finding = replace(finding, parameters=finding.parameters | sizes, effects=effects)
-        found.append(finding)
+            found[k] = replace(finding, parameters=finding.parameters | sizes, effects=effects)
     return found
 
 

@@ -134,9 +134,8 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     shared = [spot for spot in diagnosis.not_identifiable if spot.supported and spot.common]
     other = ((s.common, title_of(c)) for s in shared for c in s.causes if c != s.common)
     for common, each in _grouped(other).items():
-        causes = " or ".join(dict.fromkeys(each))
-        name = title_of(common).capitalize()
-        yield f"{name} may also be {causes}: these runs do not distinguish them.", 2, 0
+        also = f"{title_of(common)} may also be {' or '.join(dict.fromkeys(each))}"
+        yield f"{also.capitalize()}: these runs do not distinguish them.", 2, 0
     lacking = () if diagnosis.torque is None else diagnosis.torque.findings
     torque = "; ".join(f.summary() for f in lacking if f.confirmed)
     if torque:

@@ -146,9 +146,7 @@ def test_a_size_is_in_the_unit_asked_for(asked, readings):
     value, unit = SHOWN[asked]
     for alarm in (False, True):
         line = _line(window(turn, alarm), model, args)
-        found = re.match(
-            r"window +7  order 3 is off by (\S+) (\w+); baseline 7 of 8", line
-        )
+        found = re.match(r"window +7  order 3 is off by (\S+) (\w+); baseline 7 of 8", line)
         assert float(found[1]) == pytest.approx(value, rel=1e-3)
         assert found[2] == unit
         assert ("ALARM" in line) == alarm

@@ -71,7 +71,7 @@ def arm(folder):
 
 
 def steppers(folder):
-    """Two motors more may be unlike the others: of order 1 they have 903 +- 413 arcsec in common."""
+    """Two motors may be unlike the others, which have 903 +- 413 arcsec of order 1 in common."""
     splits = some_splits(ta.read_runs(folder / "stepper_encoder_units.csv"), 24, 2)
     yield from (split for split in splits if len(split[2]) > 2)
 

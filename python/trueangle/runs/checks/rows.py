@@ -78,11 +78,10 @@ def parted(runs: Sequence[CalibrationRun]) -> tuple[list[CalibrationRun], list[s
     From a loss on all is off by one more unknown, as from one run to the next.
     """
     parts, told = [], []
-    for whole, read in zip(runs, records_of(runs), strict=True):
-        run, record = whole, read
-        if old := [f for f in stuck_readings([read]) if f.fault == "stale_samples"]:
+    for run, record in zip(runs, records_of(runs), strict=True):
+        if old := [f for f in stuck_readings([record]) if f.fault == "stale_samples"]:
             rows = np.unique([row - 1 for fault in old for row in fault.rows])
-            run = whole.part(np.delete(np.arange(len(whole)), rows))
+            run = run.part(np.delete(np.arange(len(run)), rows))
             (record,) = records_of([run])
             told += [f"{fault.says}; they are omitted" for fault in old]
         faults = list(missed_counts([record]))
