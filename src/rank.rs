@@ -32,8 +32,9 @@ struct Dependence {
 
 /// An error that names the orders at fault, or none when every unknown is determined.
 ///
-/// `bound` is what the condition number does not exceed, `rounding` is what the angles are known to, in radians: it bounds how well a column is
-/// known. `angles` are those read, or none where only their sums are left.
+/// `bound` is what the condition number does not exceed, `rounding` is what the angles are known to,
+/// in radians: it bounds how well a column is known. `angles` are those read, or none where only
+/// their sums are left.
 pub fn check<I: Iterator<Item = f64>>(
     design: &Design,
     system: &System,
