@@ -225,7 +225,7 @@ def _summed(found: Accumulated, argument: Argument) -> SummedReadings:
         for file, sha256 in zip(found.files, found.sha256, strict=True)
     }
     runs, outliers, ends = [], [], []
-    for i, run in enumerate(moments.runs):
+    for number, run in enumerate(moments.runs, 1):
         assert isinstance(run, tuple)
         file, unit, label, *days = run
         kept = found.kept.columns(run)
@@ -242,7 +242,7 @@ def _summed(found: Accumulated, argument: Argument) -> SummedReadings:
                 indicated_sign=found.indicated_sign,
             )
         )
-        outliers += [(label or str(i), row) for row in tallies[run].outliers]
+        outliers += [(label or str(number), row) for row in tallies[run].outliers]
         ends.append(moments.extremes(run)[:, :2].ravel())
     return SummedReadings(
         moments,

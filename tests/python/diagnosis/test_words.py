@@ -35,7 +35,7 @@ def test_a_headline_says_which_line_and_how_large(geared):
     one, two = (f.parameters["amplitude_arcsec"] for f in geared.findings)
     sizes = [f"({x.value:.2f} +- {x.std:.2f} arcsec)" for x in (one, two)]
     what = f"periodic error of the output, order 1 {sizes[0]}, 2 {sizes[1]}"
-    assert first.startswith(f"Confirmed: {what}. What to do: ")
+    assert first.startswith(f"Confirmed: {what}. ")
     # One unit for all of a joint.
     in_degrees = geared.summary(errors_in="deg")
     assert f"order 1 ({one.value / 3600.0:.6f} +- {one.std / 3600.0:.6f} deg)" in in_degrees
