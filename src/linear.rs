@@ -25,6 +25,7 @@ mod whitening;
 pub use beside::{Beside, Powers};
 pub use blocks::{BlockProducts, block_products};
 pub use bump::Bumps;
+pub(crate) use clipped::MAD_TO_SIGMA;
 pub use clipped::{Clipped, clipped};
 pub use clusters::{Robust, cluster_covariance};
 pub use factor::{Factor, Fitted, left};

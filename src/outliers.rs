@@ -12,6 +12,7 @@
 //! in place or in time: outliers make those beside them look off.
 
 use crate::fit::median_magnitude;
+use crate::linear::MAD_TO_SIGMA;
 
 /// Most outliers side by side. More are an effect that stays.
 pub const SIDE_BY_SIDE: usize = 6;
@@ -28,10 +29,8 @@ pub struct Limits {
     pub sample: usize,
 }
 
-/// The normal distribution has this share within one standard deviation, and half of it within the
-/// median magnitude, which is this part of one.
+/// The normal distribution has this share within one standard deviation.
 const WITHIN: f64 = 0.6827;
-const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// Places closer than this are one, turns.
 const ONE_PLACE: f64 = 1e-9;
@@ -59,7 +58,8 @@ pub fn outliers(
     limits: &Limits,
 ) -> Vec<(usize, f64)> {
     let n = error.len();
-    if n < limits.fewest {
+    let fewest = limits.fewest.max(2 * SIDE_BY_SIDE);
+    if n < fewest {
         return Vec::new();
     }
     let place: Vec<f64> = angle
@@ -79,7 +79,7 @@ pub fn outliers(
     let mut far = vec![false; n];
     let most = (limits.share * n as f64) as usize;
     let (mut kept, mut gone, mut counted) = (order.clone(), 0, false);
-    while kept.len() >= limits.fewest {
+    while kept.len() >= fewest {
         let mut found = readings.candidates(&kept);
         if !found.is_empty() && !counted {
             let counts = 2.0 * sensor_count(error, indicated, period);
@@ -281,8 +281,9 @@ impl Readings<'_> {
     }
 }
 
-/// Count of a sensor, by the least difference of its readings and of their steps: the lattice that all lie on; 0 for
-/// none, and for that of places, which is no finer than they are and not spanned by the errors.
+/// Count of a sensor, by the least difference of its readings and of their steps: the lattice that
+/// all lie on; 0 for none, and for that of places, which is no finer than they are and not spanned by
+/// the errors.
 pub fn sensor_count(error: &[f64], indicated: &[f64], period: f64) -> f64 {
     // Smaller differences are the rounding of sums.
     let differences = |mut values: Vec<f64>| -> Vec<f64> {

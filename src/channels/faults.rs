@@ -3,6 +3,7 @@
 use super::curve::Curve;
 use super::likelihood::{Readings, fit};
 use crate::error::Error;
+use crate::linear::MAD_TO_SIGMA;
 
 /// The sine channel is at its rail.
 pub const SINE_RAIL: u8 = 1;
@@ -22,7 +23,7 @@ const NEAR: f64 = 0.1;
 /// Distance from the curve, in radii and in robust standard deviations, from which a reading is a
 /// dropout, and the latter over the median of the distances.
 pub(super) const OFF: f64 = 0.4;
-const DEVIATIONS: f64 = 6.0 * 1.4826;
+const DEVIATIONS: f64 = 6.0 * MAD_TO_SIGMA;
 
 /// Places that the curve is fitted to, and fits without the dropouts of the one before.
 const LOOKED_AT: usize = 4096;

@@ -97,6 +97,9 @@ impl Readings {
         let effects: Vec<Option<Taken>> = runs
             .iter()
             .map(|run| {
+                if differ.is_empty() {
+                    return None;
+                }
                 let with = |i: usize, c: usize| {
                     let (part, first) = place(inside.places[c / 2]);
                     left(run, i, part, first + c % 2)
@@ -138,7 +141,7 @@ impl Readings {
                         reach[(own, i)] += left(run, own + 1, part, c + i);
                     }
                 }
-                if let Some(taken) = taken.as_ref().filter(|_| !differ.is_empty()) {
+                if let Some(taken) = taken {
                     let own = |i: usize, j: usize| left(run, differ[i] + 1, part, c + j);
                     let x = taken
                         .effects

@@ -3,7 +3,7 @@
 use crate::spectrum::median;
 
 /// A normal distribution's standard deviation over its median absolute deviation.
-const NORMAL: f64 = 1.4826;
+pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// Smallest standard deviation that counts as one.
 const LEAST: f64 = 1e-12;
@@ -27,7 +27,7 @@ pub fn clipped(y: &[f64], left: &[f64], roots: &[f64], most: f64, least: f64) ->
     let middle = median(&mut scaled.clone());
     let about = |centre: f64| {
         let mut away: Vec<f64> = scaled.iter().map(|e| (e - centre).abs()).collect();
-        (NORMAL * median(&mut away)).max(least)
+        (MAD_TO_SIGMA * median(&mut away)).max(least)
     };
     let mut limit = most * about(middle).max(LEAST);
     let beyond = |limit: f64| move |(e, root): (&f64, &f64)| e.abs() > limit / root;
@@ -78,7 +78,7 @@ mod tests {
         let y: Vec<f64> = left.iter().map(|e| 100.0 + e).collect();
         let found = clipped(&y, &left, &[1.0; 7], 4.0, 0.0);
         // Deviations from the median 0: 0, 0.1, 0.1, 0.2, 0.3, 8, 9.
-        let limit = 4.0 * NORMAL * 0.2;
+        let limit = 4.0 * MAD_TO_SIGMA * 0.2;
         assert_eq!(
             found.outlying,
             [false, false, false, false, false, true, true]

@@ -29,7 +29,7 @@ pub fn outliers(
     let limits = core::Limits {
         wild,
         share,
-        fewest: fewest.max(2 * core::SIDE_BY_SIDE),
+        fewest,
         sample,
     };
     detached(py, || {

@@ -139,8 +139,9 @@ class NamedForms:
         own = self.account.groups[self.places[name]].alternatives
         return float(np.log(len(self.account.groups) * SIZES * own))
 
-    def beyond(self, sure: Sequence[int], tau: Sequence[float]) -> tuple[Array, Array, Array]:
+    def beyond(self, sure: Sequence[int]) -> tuple[Array, Array, Array]:
         """Free functions beside findings: their sum, their columns, covariance of these."""
+        tau = self.beside(sure)[1]
         model = self.account.any_size(self.given(sure), tau)
         _, mean, covariance = self.account.sums.posterior(model)
         free = self.account.columns_of([k for k in self.free if tau[k] > 0.0])

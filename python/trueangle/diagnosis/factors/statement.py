@@ -88,8 +88,7 @@ def stated_factors(
     lost = [k for k in range(count, len(found)) if not found[k].confirmed]
     moved = {groups[places[k]].orders[0] for k in lost}
     shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
-    sure = confirmed_names(names, found)
-    beyond = names.beyond(sure, names.beside(sure)[1])
+    beyond = names.beyond(confirmed_names(names, found))
     factors = _factors(names, found, count, shafts)
     return found[:count], factors, moved, beyond if beyond[1].size else None
 
