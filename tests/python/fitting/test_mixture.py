@@ -157,7 +157,7 @@ def test_one_sweep_states_what_it_took_as_drift() -> None:
     found, both = ta.fit(one), ta.fit([one, back])
     (note,) = [note for note in found.notes if "taken as drift: one sweep" in note]
     assert note.startswith(found.summary().splitlines()[1])
-    (size,) = re.findall(r": (\S+) arcsec rms was taken", note)
+    (size,) = re.findall(r"^Not corrected: (\S+) arcsec rms, taken", note)
     assert 0.5 < float(size) / (3600.0 * found.residual_std) < 1.0
     # Without noise, and with printed digits alone, nothing was taken.
     for digits in (12, 4, 3):

@@ -274,16 +274,17 @@ def test_no_fewer_readings_than_asked_for_and_as_many_in_each_run_and_direction(
     assert plan.readings == runs * sum(plan.counts) == made
 
 
-@pytest.mark.parametrize(("runs", "both", "least"), [(1, False, 5), (3, False, 15), (3, True, 30)])
+@pytest.mark.parametrize(("runs", "both", "least"), [(1, False, 6), (3, False, 15), (3, True, 30)])
 def test_a_run_has_a_reading_for_each_coefficient_in_each_direction(
     runs: int, both: bool, least: int
 ) -> None:
+    """And one more than there are unknowns, of which a fit has its residual."""
     def plan(readings: int) -> ta.planning.ArcPlan:
         return ta.plan_arc(0.0, 200.0, [1, 2], readings=readings, runs=runs, both_directions=both)
 
     assert plan(least).readings == least
     short = least - (6 if both else runs)
-    told = rf"readings must be at least {least} for 2 orders .*, got {short}$"
+    told = rf"readings must be at least {least} for 2 orders, got {short}$"
     with pytest.raises(ArgumentError, match=told):
         plan(short)
 

@@ -306,7 +306,7 @@ def test_the_command_prints_and_writes(desk, capsys):
     assert ta.load_simulation("next.toml").runs
     capsys.readouterr()
     assert main(["plan", "--after", "runs.csv"]) == 1
-    assert "add --simulation FILE" in capsys.readouterr().err
+    assert "--after needs the assumed joint: --simulation FILE" in capsys.readouterr().err
     assert main(["plan", "--between", "backlash,latency"]) == 1
     assert "add --after RUNS" in capsys.readouterr().err
 
