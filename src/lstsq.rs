@@ -7,6 +7,7 @@
 
 mod blocked;
 mod householder;
+mod singular;
 mod system;
 
 use std::borrow::Cow;
@@ -14,6 +15,7 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 
 pub(crate) use blocked::{cholesky, invert_upper, product, triangle};
+pub(crate) use singular::{Singular, singular};
 pub use system::{Estimate, Pivot, System};
 
 /// The upper triangle `R` of rows; the last column is the right-hand side.

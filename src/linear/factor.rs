@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::Noise;
 use super::products::{Order, Products};
-use crate::lstsq::{cholesky, invert_upper, product, triangle};
+use crate::lstsq::{Singular, cholesky, invert_upper, product, singular, triangle};
 use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch};
 
 /// Singular values below this share of the largest do not count.
@@ -24,9 +24,6 @@ const VERY_WELL: f64 = 10.0;
 
 /// Readings of which a residual is made at a time: they stay in the first cache.
 const CHUNK: usize = 1024;
-
-/// Steps for each singular value: a handful are usual.
-const STEPS: usize = 100;
 
 /// Columns `X` under a noise that `M` makes white: `Q = M X B` has orthonormal columns.
 ///
@@ -116,13 +113,14 @@ impl Factor {
         if x.iter().any(|value| !value.is_finite()) {
             return None;
         }
-        let found = triangle(x).try_svd(false, true, f64::EPSILON, STEPS * (p + 1))?;
-        let (values, turns) = (found.singular_values, found.v_t?);
-        let limit = DISTINCT * values.iter().fold(0.0, |most: f64, &value| most.max(value));
-        let kept: Vec<usize> = (0..values.len()).filter(|&k| values[k] > limit).collect();
-        let mut back = turns.select_rows(&kept).transpose();
-        for (mut column, &k) in back.column_iter_mut().zip(&kept) {
-            column.unscale_mut(values[k]);
+        let Singular { values, turns, .. } = singular(&triangle(x));
+        let kept = values
+            .iter()
+            .filter(|&value| *value > DISTINCT * values[0])
+            .count();
+        let mut back = turns.columns(0, kept).into_owned();
+        for (mut column, value) in back.column_iter_mut().zip(&values) {
+            column.unscale_mut(*value);
         }
         for (mut row, length) in back.row_iter_mut().zip(&lengths) {
             row.unscale_mut(*length);

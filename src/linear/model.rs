@@ -1,9 +1,9 @@
 //! Least squares of one design for some targets, and what it cannot see.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::rank_limit;
-use crate::lstsq::{Triangle, cholesky, invert_upper, product};
+use crate::lstsq::{Singular, Triangle, cholesky, invert_upper, product, singular};
 
 /// A triangle of unit columns whose condition is below this needs no singular values: all of
 /// its directions are far above the rank limit of any size.
@@ -60,24 +60,29 @@ impl LinearModel {
                 log_determinant: size + 2.0 * seen,
             });
         }
-        let found = unit.try_svd(true, true, f64::EPSILON, STEPS * (n + 1))?;
-        let (left, turns) = (found.u?, found.v_t?);
-        let values = found.singular_values;
-        let (kept, lost) = parted(&values, rank_limit(n) * values.max());
+        if unit.iter().any(|value| !value.is_finite()) {
+            return None;
+        }
+        let Singular {
+            values,
+            left,
+            turns,
+        } = singular(&unit);
+        let (kept, lost) = parted(&values, rank_limit(n) * values[0]);
         let left = left.select_columns(&kept);
         let turned = left.tr_mul(&right);
         let missed = right - &left * &turned;
         for (square, column) in squares.iter_mut().zip(missed.column_iter()) {
             *square += column.norm_squared();
         }
-        let mut root = turns.select_rows(&kept).transpose();
+        let mut root = turns.select_columns(&kept);
         for (mut column, &k) in root.column_iter_mut().zip(&kept) {
             column.unscale_mut(values[k]);
         }
         Some(Self {
             root: divided(root, &lengths),
             turned,
-            unseen: turns.select_rows(&lost).transpose(),
+            unseen: turns.select_columns(&lost),
             squares,
             log_determinant: size + 2.0 * kept.iter().map(|&k| values[k].ln()).sum::<f64>(),
         })
@@ -128,7 +133,7 @@ impl LinearModel {
         let found = SymmetricEigen::try_new(unit, f64::EPSILON, STEPS * (n + 1))?;
         let values = found.eigenvalues;
         let greatest = values.iter().fold(1.0, |most: f64, &value| most.max(value));
-        let (kept, lost) = parted(&values, floor.unwrap_or(rank_limit(n) * greatest));
+        let (kept, lost) = parted(values.as_slice(), floor.unwrap_or(rank_limit(n) * greatest));
         let mut root = found.eigenvectors.select_columns(&kept);
         for (mut column, &k) in root.column_iter_mut().zip(&kept) {
             column.unscale_mut(values[k].sqrt());
@@ -209,7 +214,7 @@ fn divided(mut root: DMatrix<f64>, lengths: &[f64]) -> DMatrix<f64> {
 }
 
 /// Places of values above a limit, and of the others, each from the greatest on.
-fn parted(values: &DVector<f64>, limit: f64) -> (Vec<usize>, Vec<usize>) {
+fn parted(values: &[f64], limit: f64) -> (Vec<usize>, Vec<usize>) {
     let mut places: Vec<usize> = (0..values.len()).collect();
     places.sort_by(|&i, &j| values[j].total_cmp(&values[i]));
     places.into_iter().partition(|&k| values[k] > limit)

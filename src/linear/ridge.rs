@@ -4,10 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::groups::others;
 use super::rank_limit;
-use crate::lstsq::Triangle;
-
-/// Steps for each singular value: a handful are usual.
-const STEPS: usize = 100;
+use crate::lstsq::{Singular, Triangle, singular};
 
 /// Readings that are left out together.
 #[derive(Clone, Debug)]
@@ -99,10 +96,13 @@ fn penalised(triangle: &Triangle, weight: f64, penalties: &[f64]) -> Option<DMat
         return None;
     }
     let square = full.view((0, 0), (n, n)).into_owned();
-    let found = square.try_svd(true, true, f64::EPSILON, STEPS * (n + 1))?;
-    let values = found.singular_values;
-    let least = rank_limit(n) * values.iter().fold(0.0, |most: f64, &s| most.max(s));
-    let moment = found.u?.tr_mul(&full.view((0, n), (n, 1)));
+    let Singular {
+        values,
+        left,
+        turns,
+    } = singular(&square);
+    let least = rank_limit(n) * values.first()?;
+    let moment = left.tr_mul(&full.view((0, n), (n, 1)));
     let gains = DMatrix::from_fn(n, penalties.len(), |i, j| {
         let s = values[i];
         if s > least {
@@ -111,7 +111,7 @@ fn penalised(triangle: &Triangle, weight: f64, penalties: &[f64]) -> Option<DMat
             0.0
         }
     });
-    Some(found.v_t?.tr_mul(&gains))
+    Some(turns * gains)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Numbers worked on side by side; columns are filled with zeros to a multiple of it.
-const BLOCK: usize = 8;
+pub(super) const BLOCK: usize = 8;
 
 /// The upper triangle of the QR factorisation of rows, its diagonal not negative.
 pub fn triangle(rows: &DMatrix<f64>) -> DMatrix<f64> {
@@ -86,7 +86,7 @@ impl Kernel for Reflections<'_> {
 }
 
 #[inline(always)]
-fn dot<L: Lanes>(a: &[[f64; BLOCK]], b: &[[f64; BLOCK]]) -> f64 {
+pub(super) fn dot<L: Lanes>(a: &[[f64; BLOCK]], b: &[[f64; BLOCK]]) -> f64 {
     let mut sums = [0.0; BLOCK];
     for (a, b) in a.iter().zip(b) {
         for i in 0..BLOCK {

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::Triangle;
 use super::blocked::{invert_upper, product, times_transpose};
+use super::singular::singular;
 
 /// Above this size the condition number is estimated by power iteration (a few per
 /// cent low at most) instead of all singular values, whose cost grows fastest.
@@ -216,8 +217,8 @@ impl System {
     pub fn condition_number(&self) -> f64 {
         let (runs, n) = (self.runs.len(), self.columns());
         if runs + n <= SINGULAR_VALUES_UP_TO {
-            let values = self.factor().singular_values();
-            return values.max() / values.min();
+            let values = singular(&self.factor()).values;
+            return values[0] / values[values.len() - 1];
         }
         let square = self.shared.square();
         let shared = square.view((0, 0), (n, n));
