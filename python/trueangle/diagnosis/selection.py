@@ -202,14 +202,12 @@ def _with_lines_for_bumps(regression: Regression) -> Regression:
     One after the other each line saves less than a bump that imitates all of them at once.
     """
     plain = [term for term in regression.terms if term.cause != LocalDefect.kind]
-    travel = regression.signals.run_turns().max()
-    # Over a part of a turn other paths take lines first (`_by_other_paths`).
-    if len(plain) == len(regression.terms) or travel < LocalDefect.flexible_below:
+    if len(plain) == len(regression.terms):
         return regression
     lines = _forward(regression.with_terms(plain), [MissingOrder.kind])
     if len(lines.terms) < len(plain) + 2:
         return regression
-    tried = _pruned(_forward(lines, list(EFFECTS)))
+    tried = _pruned(_forward(_pruned(lines), list(EFFECTS)))
     return min(regression, tried, key=total_penalty)
 
 

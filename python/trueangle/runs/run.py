@@ -247,11 +247,13 @@ class CalibrationRun:
 
         The signal ``direction`` where given, else the sign of ``velocity``, else of the
         last step of the reference that was not zero; a reading belongs to the step that
-        led to it, those before the first motion to that.
+        led to it, those before the first motion to that. A velocity below 1e-12 of the
+        greatest is the rounding of a rest, which has the direction of the motion before it.
         """
         given = self.signals.get("direction", self.velocity)
         if given is not None:
-            sign = np.sign(given)
+            # What a moving mean leaves of zeros depends on the processor.
+            sign = np.sign(given) * (np.abs(given) > 1e-12 * np.abs(given).max(initial=0.0))
         elif len(self) < 2:
             return np.zeros(len(self))
         else:

@@ -343,6 +343,19 @@ def test_close_readings_are_read_off_their_own_record(delay):
     assert np.abs(by_speed - wanted)[inside].max() > 0.03
 
 
+def test_a_velocity_of_rounding_is_rest_and_keeps_the_direction() -> None:
+    """A moving mean of zeros is rounding, of another sign on another processor."""
+    theta = np.concatenate([np.arange(50.0), np.full(40, 49.0), np.arange(48.0, 0.0, -1.0)])
+    velocity = np.diff(theta, prepend=-1.0)
+    rounded = velocity + np.where(velocity == 0.0, 1e-13 * (-1.0) ** np.arange(theta.size), 0.0)
+    still, noisy = (
+        CalibrationRun(theta, theta, 360.0, time=np.arange(theta.size) / 10.0, velocity=v)
+        for v in (velocity, rounded)
+    )
+    assert np.array_equal(noisy.direction, still.direction)
+    assert np.array_equal(np.flatnonzero(np.diff(still.direction)), [89])
+
+
 def test_the_direction_is_that_of_the_time_before():
     found, time = signals(0.01)
     then = earlier_signals(found, 0.1)
