@@ -279,6 +279,7 @@ def test_a_run_has_a_reading_for_each_coefficient_in_each_direction(
     runs: int, both: bool, least: int
 ) -> None:
     """And one more than there are unknowns, of which a fit has its residual."""
+
     def plan(readings: int) -> ta.planning.ArcPlan:
         return ta.plan_arc(0.0, 200.0, [1, 2], readings=readings, runs=runs, both_directions=both)
 
