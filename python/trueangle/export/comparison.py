@@ -177,9 +177,9 @@ class Comparison(PlainResult):
         one phase, None where neither model states a covariance; ``model`` is "A" or "B" where only
         the first or the second has the order, else "both".
     rms_arcsec, max_abs_arcsec : float
-        Of the difference over a turn, its zero taken out.
+        Of the difference over a turn or the travel, its zero taken out.
     std_arcsec : float or None
-        Standard deviation of the difference over a turn, without its zero, from the
+        Standard deviation of the difference over the same, without its zero, from the
         covariances of both; None where neither states one.
     each_std_arcsec : list of float or None
         The same of the first and of the second model.
@@ -202,6 +202,8 @@ class Comparison(PlainResult):
     false_alarms : float
         Below which ``p`` is "changed": the share of unchanged patterns that are reported as
         changed.
+    travel_deg : list of float or None
+        First and last angle of the travel that both were fitted on; None for whole turns.
     """
 
     orders: list[dict[str, Any]]
@@ -217,6 +219,7 @@ class Comparison(PlainResult):
     verdict: Literal["same", "changed"] | None = None
     p: float | None = None
     false_alarms: float = FALSE_ALARMS
+    travel_deg: list[float] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes."""
@@ -262,7 +265,10 @@ class Comparison(PlainResult):
 
     def _verdict(self, unit: ErrorUnit) -> list[str]:
         """Whether the models differ, by how much, and which of them to use."""
-        size = f"{unit.text(self.rms_arcsec)} rms over the turn"
+        over = "over the turn"
+        if self.travel_deg is not None:
+            over = "over {:.4g} to {:.4g} deg, which both were fitted on".format(*self.travel_deg)
+        size = f"{unit.text(self.rms_arcsec)} rms {over}"
         if self.verdict is None or self.p is None:
             return [f"Difference {size}; not tested: that needs the covariance of both models."]
         a, b = (std or 0.0 for std in self.each_std_arcsec)
@@ -273,7 +279,7 @@ class Comparison(PlainResult):
             # Where the difference is less than what either is uncertain by, that one is no judge.
             if max(a, b) < self.rms_arcsec:
                 use = "To see which one fits today: trueangle watch READINGS -m A, then B."
-        known = f"Standard error over the turn: {unit.text(a)} rms of A, {unit.text(b)} of B."
+        known = f"Standard error there: {unit.text(a)} rms of A, {unit.text(b)} of B."
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
         p = f"p {p}: probability of such a difference if only noise differs; a change is reported"
         return [first, f"{use} {known}", f"{p} below {self.false_alarms:g}."]
@@ -329,7 +335,8 @@ def compare(
     Raises
     ------
     ArgumentError
-        Shafts of which one turn of the output does not come back to the start.
+        Shafts of which one turn of the output does not come back to the start; models that
+        were fitted on parts of the turn that have nothing in common.
 
     Examples
     --------
@@ -359,15 +366,10 @@ def compare(
     if points > 1 << 22:
         raise ArgumentError(f"order {top:g} is too high to be compared over a turn")
     x = np.arange(points, dtype=np.float64) * (turns / points)
-    if at_readings:
-        difference = two.correction(x) - one.correction(x)
-    elif same:
-        difference = two.error(x) - one.error(x)
-    else:
-        difference = _at_truth(two, x) - _at_truth(one, x)
+    difference = _difference(one, two, x, same, at_readings)
+    travel = _common_travel(first, second)
     zero = float(np.mean(difference)) if turns == 1 or at_readings else 0.0
-    difference = difference - zero
-    spectrum = np.fft.rfft(difference) * (2.0 / points)
+    spectrum = np.fft.rfft(difference - zero) * (2.0 / points)
     rows: list[dict[str, Any]] = []
     for order in orders:
         if same:
@@ -375,7 +377,7 @@ def compare(
         elif turns == 1:
             z = complex(spectrum[round(order)].conjugate())
         else:
-            z = complex(2.0 * np.mean(difference * np.exp(2j * np.pi * order * x)))
+            z = complex(2.0 * np.mean((difference - zero) * np.exp(2j * np.pi * order * x)))
         size = {"order": order, "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN}
         phase = math.degrees(math.atan2(z.real, z.imag)) % 360.0
         of = "both" if order in one.lines and order in two.lines else "BA"[order in one.lines]
@@ -387,6 +389,13 @@ def compare(
     kinds = dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
     terms = [kind for kind in kinds if _terms(first, kind) != _terms(second, kind)]
     each = [pattern.uncertainty_arcsec for pattern in (one, two)]
+    if travel is not None:
+        count = min(math.ceil(points / turns * (travel[1] - travel[0])), 1 << 22)
+        x = np.linspace(*travel, 1 + count)
+        difference = _difference(one, two, x, same, at_readings)
+        zero = float(np.mean(difference))
+        each = [_spread(model, x) for model in (first, second)]
+    difference = difference - zero
     known = [std for std in each if std is not None]
     told: Equality | None = pattern_equality(first, second) if same else None
     return Comparison(
@@ -402,7 +411,55 @@ def compare(
         table_max_abs_arcsec=sum(t.max_abs * u for t, u in tables) if tables else None,
         verdict=None if told is None else told.verdict,
         p=None if told is None else told.p,
+        travel_deg=None if travel is None else [360.0 * end for end in travel],
     )
+
+
+def _difference(
+    one: TurnPattern, two: TurnPattern, x: Array, same: bool, at_readings: bool
+) -> Array:
+    if at_readings:
+        return two.correction(x) - one.correction(x)
+    if same:
+        return two.error(x) - one.error(x)
+    return _at_truth(two, x) - _at_truth(one, x)
+
+
+def _common_travel(first: HarmonicModel, second: HarmonicModel) -> tuple[float, float] | None:
+    """The longest part of the turn that both were fitted on, in turns; None for all of it."""
+    found = (-math.inf, math.inf)
+    for model in (first, second):
+        if model.partial_span is None:
+            continue
+        own = tuple(end / model.period for end in model.partial_span)
+        # The same places of another turn, where the error repeats after it.
+        moves = (-1.0, 0.0, 1.0) if model.is_periodic and math.isfinite(found[0]) else (0.0,)
+        found = max(
+            ((max(found[0], own[0] + k), min(found[1], own[1] + k)) for k in moves),
+            key=lambda part: part[1] - part[0],
+        )
+    if not found[0] < found[1]:
+        raise ArgumentError(
+            "the models were fitted on different parts of the turn: no place is in both"
+        )
+    return found if math.isfinite(found[0]) else None
+
+
+def _spread(model: HarmonicModel, x: Array) -> float | None:
+    """Standard deviation of a model over places in turns, their mean taken out, arcsec."""
+    if model.covariance is None:
+        return None
+    places = x[:: max(1, x.size // 4096)]
+    columns = [
+        wave(2.0 * np.pi * k * shaft.cycles_per_turn * places)
+        for shaft in model.shafts
+        for k in shaft.orders
+        for wave in (np.cos, np.sin)
+    ]
+    rows = np.array(columns).T
+    rows -= rows.mean(axis=0)
+    variance = float(np.mean(np.sum((rows @ model.covariance[1:, 1:]) * rows, axis=1)))
+    return math.sqrt(max(variance, 0.0)) / model.period * ARCSEC_PER_TURN
 
 
 def _is_looked_up(model: HarmonicModel) -> bool:

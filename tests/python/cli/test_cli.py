@@ -318,8 +318,9 @@ def asked(tmp_path, monkeypatch):
     return ask
 
 
-def test_without_options_it_is_the_plan_of_the_api(asked):
+def test_without_options_it_is_the_plan_of_the_api_and_limits_are_those_of_the_file(asked):
     assert asked() == {"between": None, "limits": None, "progress": "auto"}
+    assert asked("--limits", "limits.toml")["limits"].runs == 3
 
 
 @pytest.mark.parametrize(
@@ -338,7 +339,3 @@ def test_an_option_is_what_it_is_made_by(words, name, value, asked):
     others = asked()
     others.pop(name, None)
     assert given == others
-
-
-def test_limits_are_those_of_the_file(asked):
-    assert asked("--limits", "limits.toml")["limits"].runs == 3

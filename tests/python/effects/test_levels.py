@@ -25,12 +25,9 @@ def hides_drift(temperatures):
 
 
 @pytest.mark.parametrize("middle", [20.0, 20.25, 20.5, 20.75])
-def test_runs_alike_in_temperature_are_one_level(middle):
+def test_runs_are_one_level_unless_they_are_a_kelvin_apart(middle):
     assert not hides_drift([middle - 0.02, middle, middle + 0.02])
-
-
-def test_runs_a_kelvin_apart_are_levels_of_their_own():
-    assert hides_drift([20.0, 21.1, 22.2])
+    assert hides_drift([middle, middle + 1.1, middle + 2.2])
 
 
 @pytest.mark.parametrize("count", [4, 7, 11, 12, 21])

@@ -38,32 +38,24 @@ def wrapped(turn, turns=3.0, low=0.0, count=900):
         (np.linspace(-150.0, 170.0, 400), RAD, None, "deg"),
         (wrapped(16384.0).astype(np.int64), DEG, None, "count"),
         (np.linspace(0.6, 1.9, 200), DEG, (30.0, 120.0), "rad"),
+        # Ordinary readings.
+        (np.full(500, 1.2), DEG, None, None),
+        (1.2 + 0.3 * np.sin(np.linspace(0.0, 60.0, 500)), DEG, None, None),
+        (np.linspace(-1.0, 1.2, 300), DEG, (-90.0, 90.0), None),
+        (wrapped(DEG), DEG, None, None),
+        (np.linspace(-170.0, 170.0, 300), DEG, None, None),
+        (np.linspace(0.0, 3000.0, 300), DEG, None, None),
+        (np.linspace(-3.1, 3.1, 300), RAD, None, None),
+        (np.linspace(0.0, 40.0, 300), RAD, None, None),
+        (np.linspace(0.0, 2500.0, 300), RAD, None, None),
+        (np.linspace(-120.0, -60.0, 300), DEG, (0.0, 90.0), None),
+        (np.linspace(400.0, 440.0, 300), DEG, (30.0, 120.0), None),
+        (np.array([0.0, 6.28]), DEG, None, None),
+        (np.full(300, np.nan), DEG, None, None),
     ],
 )
-def test_another_unit_is_seen(values, period, span, unit):
+def test_another_unit_is_seen_and_ordinary_readings_are_not_doubted(values, period, span, unit):
     assert [seen(values, period, span, batches) for batches in BATCHES] == [unit] * len(BATCHES)
-
-
-@pytest.mark.parametrize(
-    ("values", "period", "span"),
-    [
-        (np.full(500, 1.2), DEG, None),
-        (1.2 + 0.3 * np.sin(np.linspace(0.0, 60.0, 500)), DEG, None),
-        (np.linspace(-1.0, 1.2, 300), DEG, (-90.0, 90.0)),
-        (wrapped(DEG), DEG, None),
-        (np.linspace(-170.0, 170.0, 300), DEG, None),
-        (np.linspace(0.0, 3000.0, 300), DEG, None),
-        (np.linspace(-3.1, 3.1, 300), RAD, None),
-        (np.linspace(0.0, 40.0, 300), RAD, None),
-        (np.linspace(0.0, 2500.0, 300), RAD, None),
-        (np.linspace(-120.0, -60.0, 300), DEG, (0.0, 90.0)),
-        (np.linspace(400.0, 440.0, 300), DEG, (30.0, 120.0)),
-        (np.array([0.0, 6.28]), DEG, None),
-        (np.full(300, np.nan), DEG, None),
-    ],
-)
-def test_ordinary_readings_are_not_doubted(values, period, span):
-    assert [seen(values, period, span, batches) for batches in BATCHES] == [None] * len(BATCHES)
 
 
 def beside_and_inside(low, high, span, period, factor):
