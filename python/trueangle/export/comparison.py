@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 from os import PathLike
@@ -13,7 +14,7 @@ from ..errors import ArgumentError
 from ..estimation.linear import wald_statistic
 from ..model.file import load_model
 from ..model.model import HarmonicModel
-from ..support.angles import ARCSEC_PER_TURN, zero_text
+from ..support.angles import ARCSEC_PER_TURN, wrap, zero_text
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
@@ -76,14 +77,13 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
     common = [order for order in sides[0] if order in sides[1]]
     if not common:
         return None
-    values, spreads, weights = [], [], []
+    values, weights, whole = [], [], np.zeros((2 * len(common), 2 * len(common)))
     for model, places in zip((first, second), sides, strict=True):
         at = [i for order in common for i in places[order][0]]
         values.append(np.array([v for order in common for v in places[order][1]]) / model.period)
         spread = np.asarray(model.covariance)[np.ix_(at, at)] / model.period**2
-        spreads.append(spread)
+        whole += spread
         weights.append((float(np.trace(spread)), _freedom(model)))
-    whole = spreads[0] + spreads[1]
     scale = np.sqrt(np.diag(whole))
     if not (scale > 0.0).all():
         return None
@@ -109,10 +109,10 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
             spread = np.asarray(model.covariance)[np.ix_(rows, rows)]
             if float(np.linalg.det(spread)) > 0.0:
                 alone = wald_statistic(np.array(pair), 2.0 * spread)
-                chance = _pair_tail if scattered else _known_tail
+                chance = _pair_tail(alone, freedom) if scattered else f_tail(alone / 2, 2, freedom)
                 # Factor on the p-value of a single order: the orders that a selection tests in two
                 # models.
-                p = min(p, 220 * chance(alone, freedom))
+                p = min(p, 220 * chance)
     return Equality("changed" if p <= FALSE_ALARMS else "same", p, statistic, len(common))
 
 
@@ -129,11 +129,6 @@ def _pair_tail(squares: float, freedom: float) -> float:
     # Fewest degrees of freedom of a scatter: fewer contain no information.
     left = max(freedom - 1.0, 0.1)
     return f_tail(squares * left / (2.0 * freedom), 2.0, left)
-
-
-def _known_tail(squares: float, freedom: float) -> float:
-    """The same for a covariance that is known except for its size."""
-    return f_tail(squares / 2.0, 2.0, freedom)
 
 
 def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tuple[float, float]]]:
@@ -177,10 +172,11 @@ class Comparison(PlainResult):
         one phase, None where neither model states a covariance; ``model`` is "A" or "B" where only
         the first or the second has the order, else "both".
     rms_arcsec, max_abs_arcsec : float
-        Of the difference over a turn or the travel, its zero taken out.
+        Of the difference over the turn, or what both were fitted on, its zero taken out.
     std_arcsec : float or None
-        Standard deviation of the difference over the same, without its zero, from the
-        covariances of both; None where neither states one.
+        Standard deviation of the difference over the same, from the covariances of both; None
+        where neither states one. Over a turn it is without the zero, which readings of a part
+        of it do not separate from the orders.
     each_std_arcsec : list of float or None
         The same of the first and of the second model.
     zero_deg : float
@@ -202,8 +198,8 @@ class Comparison(PlainResult):
     false_alarms : float
         Below which ``p`` is "changed": the share of unchanged patterns that are reported as
         changed.
-    travel_deg : list of float or None
-        First and last angle of the travel that both were fitted on; None for whole turns.
+    share : float
+        Of the turn that both were fitted on: what it is measured over.
     """
 
     orders: list[dict[str, Any]]
@@ -219,7 +215,7 @@ class Comparison(PlainResult):
     verdict: Literal["same", "changed"] | None = None
     p: float | None = None
     false_alarms: float = FALSE_ALARMS
-    travel_deg: list[float] | None = None
+    share: float = 1.0
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes."""
@@ -265,10 +261,8 @@ class Comparison(PlainResult):
 
     def _verdict(self, unit: ErrorUnit) -> list[str]:
         """Whether the models differ, by how much, and which of them to use."""
-        over = "over the turn"
-        if self.travel_deg is not None:
-            over = "over {:.4g} to {:.4g} deg, which both were fitted on".format(*self.travel_deg)
-        size = f"{unit.text(self.rms_arcsec)} rms {over}"
+        part = "the turn" if self.share == 1.0 else f"the {self.share:.0%} that both were fitted on"
+        size = f"{unit.text(self.rms_arcsec)} rms over {part}"
         if self.verdict is None or self.p is None:
             return [f"Difference {size}; not tested: that needs the covariance of both models."]
         a, b = (std or 0.0 for std in self.each_std_arcsec)
@@ -366,20 +360,21 @@ def compare(
     if points > 1 << 22:
         raise ArgumentError(f"order {top:g} is too high to be compared over a turn")
     x = np.arange(points, dtype=np.float64) * (turns / points)
-    difference = _difference(one, two, x, same, at_readings)
-    travel = _common_travel(first, second)
+    # What the models make of a reading, of their argument, of a true angle.
+    curve = TurnPattern.correction if at_readings else TurnPattern.error if same else _at_truth
+    difference = curve(two, x) - curve(one, x)
+    inside = _fitted(first, x) & _fitted(second, x)
+    if not inside.any():
+        raise ArgumentError("the models were fitted on different parts of the turn: none is common")
     zero = float(np.mean(difference)) if turns == 1 or at_readings else 0.0
-    spectrum = np.fft.rfft(difference - zero) * (2.0 / points)
     rows: list[dict[str, Any]] = []
     for order in orders:
         if same:
-            z = _line(second, order) - _line(first, order)
-        elif turns == 1:
-            z = complex(spectrum[round(order)].conjugate())
+            z = two.waves.get(order, 0j) - one.waves.get(order, 0j)
         else:
-            z = complex(2.0 * np.mean((difference - zero) * np.exp(2j * np.pi * order * x)))
+            z = 2j * complex(np.mean((difference - zero) * np.exp(-2j * np.pi * order * x)))
         size = {"order": order, "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN}
-        phase = math.degrees(math.atan2(z.real, z.imag)) % 360.0
+        phase = math.degrees(cmath.phase(z)) % 360.0
         of = "both" if order in one.lines and order in two.lines else "BA"[order in one.lines]
         std = _std(first, second, order)
         rows.append({**size, "phase_deg": phase, "std_arcsec": std, "model": of})
@@ -389,12 +384,9 @@ def compare(
     kinds = dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
     terms = [kind for kind in kinds if _terms(first, kind) != _terms(second, kind)]
     each = [pattern.uncertainty_arcsec for pattern in (one, two)]
-    if travel is not None:
-        count = min(math.ceil(points / turns * (travel[1] - travel[0])), 1 << 22)
-        x = np.linspace(*travel, 1 + count)
-        difference = _difference(one, two, x, same, at_readings)
-        zero = float(np.mean(difference))
-        each = [_spread(model, x) for model in (first, second)]
+    if not inside.all():
+        difference, zero = difference[inside], float(np.mean(difference[inside]))
+        each = [_spread(model, x[inside]) for model in (first, second)]
     difference = difference - zero
     known = [std for std in each if std is not None]
     told: Equality | None = pattern_equality(first, second) if same else None
@@ -404,62 +396,31 @@ def compare(
         max_abs_arcsec=float(np.max(np.abs(difference))) * ARCSEC_PER_TURN,
         std_arcsec=math.hypot(*known) if known else None,
         each_std_arcsec=each,
-        zero_deg=_signed(two.zero - one.zero + zero) * 360.0,
+        zero_deg=float(wrap(two.zero - one.zero + zero, 1.0)) * 360.0,
         argument="indicated" if at_readings else first.argument if same else "reference",
         differ_in=terms,
         table_rms_arcsec=math.hypot(*(t.rms * u for t, u in tables)) if tables else None,
         table_max_abs_arcsec=sum(t.max_abs * u for t, u in tables) if tables else None,
         verdict=None if told is None else told.verdict,
         p=None if told is None else told.p,
-        travel_deg=None if travel is None else [360.0 * end for end in travel],
+        share=float(np.mean(inside)),
     )
 
 
-def _difference(
-    one: TurnPattern, two: TurnPattern, x: Array, same: bool, at_readings: bool
-) -> Array:
-    if at_readings:
-        return two.correction(x) - one.correction(x)
-    if same:
-        return two.error(x) - one.error(x)
-    return _at_truth(two, x) - _at_truth(one, x)
-
-
-def _common_travel(first: HarmonicModel, second: HarmonicModel) -> tuple[float, float] | None:
-    """The longest part of the turn that both were fitted on, in turns; None for all of it."""
-    found = (-math.inf, math.inf)
-    for model in (first, second):
-        if model.partial_span is None:
-            continue
-        own = tuple(end / model.period for end in model.partial_span)
-        # The same places of another turn, where the error repeats after it.
-        moves = (-1.0, 0.0, 1.0) if model.is_periodic and math.isfinite(found[0]) else (0.0,)
-        found = max(
-            ((max(found[0], own[0] + k), min(found[1], own[1] + k)) for k in moves),
-            key=lambda part: part[1] - part[0],
-        )
-    if not found[0] < found[1]:
-        raise ArgumentError(
-            "the models were fitted on different parts of the turn: no place is in both"
-        )
-    return found if math.isfinite(found[0]) else None
+def _fitted(model: HarmonicModel, x: Array) -> Any:
+    """Which places in turns lie within the part of the turn that was fitted."""
+    span = model.partial_span
+    if span is None or not model.is_periodic:
+        return np.ones(x.size, dtype=bool)
+    return (x * model.period - span[0]) % model.period <= span[1] - span[0]
 
 
 def _spread(model: HarmonicModel, x: Array) -> float | None:
-    """Standard deviation of a model over places in turns, their mean taken out, arcsec."""
+    """Standard deviation of a model over places in turns, arcsec."""
     if model.covariance is None:
         return None
-    places = x[:: max(1, x.size // 4096)]
-    columns = [
-        wave(2.0 * np.pi * k * shaft.cycles_per_turn * places)
-        for shaft in model.shafts
-        for k in shaft.orders
-        for wave in (np.cos, np.sin)
-    ]
-    rows = np.array(columns).T
-    rows -= rows.mean(axis=0)
-    variance = float(np.mean(np.sum((rows @ model.covariance[1:, 1:]) * rows, axis=1)))
-    return math.sqrt(max(variance, 0.0)) / model.period * ARCSEC_PER_TURN
+    rms = float(np.sqrt(np.mean(model.band(x * model.period) ** 2)))
+    return rms / model.period * ARCSEC_PER_TURN
 
 
 def _is_looked_up(model: HarmonicModel) -> bool:
@@ -470,35 +431,18 @@ def _is_looked_up(model: HarmonicModel) -> bool:
     return fit.table is None or fit.table.argument == "indicated"
 
 
-def _signed(turns: float) -> float:
-    return turns - math.ceil(turns - 0.5)
-
-
 def _at_truth(pattern: TurnPattern, theta: Array) -> Array:
     return pattern.reading(theta) - theta - pattern.zero
 
 
-def _line(model: HarmonicModel, order: float) -> complex:
-    """``A + iB`` of an output order, in turns."""
-    return complex(
-        sum(
-            complex(a, b)
-            for shaft in model.shafts
-            for k, a, b in zip(shaft.orders, shaft.cosine, shaft.sine, strict=True)
-            if k * shaft.cycles_per_turn == order
-        )
-        / model.period
-    )
-
-
 def _std(first: HarmonicModel, second: HarmonicModel, order: float) -> float | None:
     """Of one coefficient of the difference, in arcsec."""
-    variances = []
-    for model in (first, second):
-        known = _coefficients(model).get(order)
-        if known is not None and model.covariance is not None:
-            spread = np.diag(model.covariance)[list(known[0])]
-            variances.append(float(spread.mean()) / model.period**2)
+    places = [(model, _coefficients(model).get(order)) for model in (first, second)]
+    variances = [
+        float(np.diag(model.covariance)[list(at[0])].mean()) / model.period**2
+        for model, at in places
+        if at is not None and model.covariance is not None
+    ]
     return math.sqrt(sum(variances)) * ARCSEC_PER_TURN if variances else None
 
 

@@ -99,12 +99,16 @@ class TurnPattern:
     @property
     def lines(self) -> dict[float, float]:
         """Amplitude in turns of every output order."""
+        return {order: abs(wave) for order, wave in self.waves.items()}
+
+    @property
+    def waves(self) -> dict[float, complex]:
+        """``C exp(iφ)`` of every output order ``C sin(kθ + φ)``, in turns."""
         model = self.model
         found: dict[float, complex] = {}
         for order, size, phase in zip(model.orders, model.amplitudes, model.phases, strict=True):
-            wave = complex(size / self.period * np.exp(1j * phase))
-            found[order] = found.get(order, 0j) + wave
-        return {order: abs(wave) for order, wave in sorted(found.items())}
+            found[order] = found.get(order, 0j) + complex(size / self.period * np.exp(1j * phase))
+        return dict(sorted(found.items()))
 
     @property
     def uncertainty_arcsec(self) -> float | None:

@@ -72,9 +72,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
         matplotlib is not installed.
     """
     picture = errors_picture(fit.runs, fit, fit_error_unit(fit, errors_in))
-    ax = new_axes(ax)
-    draw_panel(ax, picture.panels[0])
-    return _finished(ax, picture, "Measured error of every run, and the model")
+    return _drawn(ax, picture, "Measured error of every run, and the model")
 
 
 def before_after(
@@ -105,9 +103,7 @@ def before_after(
     unit = error_unit(errors_in, rms_amplitude(before for before, _ in pairs), model.period)
     numbered = [(number, *pair) for number, pair in enumerate(pairs)]
     picture = before_after_picture(numbered, fitted_degrees(model), unit)
-    ax = new_axes(ax)
-    draw_panel(ax, picture.panels[0])
-    return _finished(ax, picture, "Held-out runs before and after correction")
+    return _drawn(ax, picture, "Held-out runs before and after correction")
 
 
 def residuals(
@@ -139,9 +135,7 @@ def residuals(
         An unknown signal, or one that no run has.
     """
     picture = residual_picture(fit, against, fit_error_unit(fit, errors_in))
-    ax = new_axes(ax, height=3.4)
-    draw_panel(ax, picture.panels[0])
-    return _finished(ax, picture, f"Residual against {against}")
+    return _drawn(ax, picture, f"Residual against {against}", height=3.4)
 
 
 def measured_and_simulated(
@@ -192,11 +186,14 @@ def measured_and_simulated(
     ticks = [float(tick) for tick in ax.get_yticks() if lowest <= tick <= top]
     texts = [f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks]
     ax.set_yticks([down, *ticks], ["0", *texts])
-    return _finished(ax, picture, "Measured and simulated error")
+    legend(ax)
+    return described(ax, picture.told, "Measured and simulated error")
 
 
-def _finished(ax: Axes, picture: PanelPicture, title: str) -> Axes:
-    """With the legend, the sentence and the title of a picture."""
+def _drawn(ax: Axes | None, picture: PanelPicture, title: str, height: float = 4.0) -> Axes:
+    """The first panel of a picture with its legend, sentence and title."""
+    ax = new_axes(ax, height=height)
+    draw_panel(ax, picture.panels[0])
     legend(ax)
     return described(ax, picture.told, title)
 

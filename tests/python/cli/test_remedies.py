@@ -241,38 +241,30 @@ def three() -> list[ta.CalibrationRun]:
 
 
 #: What is refused: readings, the command, words of the message, the command that helps.
-REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str, str]] = {
-    "no order": (noise, ["fit", "R", "-o", "m.json"], "no order is above the noise", "diagnose"),
-    "no order, few readings": (few, ["fit", "R", "-o", "m.json"], "take 20 readings", "plan"),
-    "no order, 3 readings": (three, ["fit", "R", "-o", "m.json"], "1 zero need 4 readings", "plan"),
+REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], str, str, str]] = {
+    "no order": (noise, "fit R -o m.json", "no order is above the noise", "diagnose"),
+    "no order, few readings": (few, "fit R -o m.json", "take 20 readings", "plan"),
+    "no order, 3 readings": (three, "fit R -o m.json", "1 zero need 4 readings", "plan"),
     "no order, a gear": (
-        noise,
-        ["fit", "R", "-o", "m.json", "--gear-ratio", "50.5", "--fixed-member", "none"],
-        "no order is above the noise",
-        "diagnose",
+        noise, "fit R -o m.json --gear-ratio 50.5 --fixed-member none",
+        "no order is above the noise", "diagnose",
     ),
-    "too steep": (steep, ["fit", "R", "-o", "m.json", "--orders", "24"], "may reach", "fit"),
+    "too steep": (steep, "fit R -o m.json --orders 24", "may reach", "fit"),
     "too steep, diagnosed": (
-        steep,
-        ["diagnose", "R", "--gear-ratio", "1", "--corrected-model", "m.json"],
-        "may reach",
-        "diagnose",
+        steep, "diagnose R --gear-ratio 1 --corrected-model m.json",
+        "may reach", "diagnose",
     ),
-    "aliases": (coarse, ["fit", "R", "-o", "m.json", "--orders", "1,37"], "cannot be", "orders"),
+    "aliases": (coarse, "fit R -o m.json --orders 1,37", "cannot be", "orders"),
     "not told apart, other names": (
-        coarse,
-        ["fit", "R", "-o", "m.json", "--orders", "1,37", "--signal", "indicated=indicated_deg:deg"],
-        "cannot be distinguished from",
-        "orders",
+        coarse, "fit R -o m.json --orders 1,37 --signal indicated=indicated_deg:deg",
+        "cannot be distinguished from", "orders",
     ),
-    "no heads": (noise, ["selfcal", "R", "-o", "m.json", "--method", "heads"], "two heads", "plan"),
+    "no heads": (noise, "selfcal R -o m.json --method heads", "two heads", "plan"),
     "no motion to calibrate by, a gear": (
-        noise,
-        ["selfcal", "R", "-o", "m.json", "--method", "heads", "--gear-ratio", "50.5"],
-        "two heads",
-        "plan",
+        noise, "selfcal R -o m.json --method heads --gear-ratio 50.5",
+        "two heads", "plan",
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -380,7 +372,8 @@ def test_a_unit_that_is_missing_is_told_as_an_option_that_works(
 def test_the_command_that_is_named_works(
     what: str, desk: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    readings, words, told, command = REFUSALS[what]
+    readings, line, told, command = REFUSALS[what]
+    words = line.split()
     ta.write_runs(readings(), "two  blanks.csv")
     assert main(["two  blanks.csv" if word == "R" else word for word in words]) == 1
     said = capsys.readouterr().err
@@ -388,7 +381,7 @@ def test_the_command_that_is_named_works(
     program, *again = shlex.split(said.split("; run: ")[1])
     assert (program, again[0]) == ("trueangle", command)
     if "--gear-ratio" in words:  # of the same joint
-        before, after = (float(line[line.index("--gear-ratio") + 1]) for line in (words, again))
+        before, after = (float(by[by.index("--gear-ratio") + 1]) for by in (words, again))
         assert after == before
     assert main(again) == 0
     assert capsys.readouterr().out
