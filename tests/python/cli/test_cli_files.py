@@ -93,11 +93,17 @@ WRITING = {
         ["r.csv", "b.toml", "l.toml"],
     ),
     "diagnose --corrected-model": (
-        "diagnose r.csv --simulation b.toml --model m.json --corrected-model OUT".split(),
+        [
+            *("diagnose", "r.csv", "--simulation", "b.toml"),
+            *("--model", "m.json", "--corrected-model", "OUT"),
+        ],
         ["r.csv", "b.toml", "m.json"],
     ),
     "rehearse --plot": (
-        "rehearse b.toml --causes backlash --seeds 1 --workers 1 --plot OUT".split(),
+        [
+            *("rehearse", "b.toml", "--causes", "backlash", "--seeds"),
+            *("1", "--workers", "1", "--plot", "OUT"),
+        ],
         ["b.toml"],
     ),
     "report": (["report", "r.csv", "--simulation", "b.toml", "-o", "OUT"], ["r.csv", "b.toml"]),
@@ -314,7 +320,10 @@ def run(arguments, **more):
         ["simulate", "DEV", "-o", "x.csv"],
         ["diagnose", "DEV", "--simulation", "b.toml"],
         ["diagnose", "r.csv", "--simulation", "DEV"],
-        "diagnose r.csv --simulation b.toml --model DEV --corrected-model x.json".split(),
+        [
+            *("diagnose", "r.csv", "--simulation", "b.toml"),
+            *("--model", "DEV", "--corrected-model", "x.json"),
+        ],
         ["report", "DEV", "-o", "x.html"],
         ["report", "r.csv", "--simulation", "DEV", "-o", "x.html"],
     ],
