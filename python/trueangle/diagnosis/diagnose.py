@@ -29,11 +29,7 @@ from .delay import delay_factor, delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
 from .drive import diagnose_drive
 from .finding import Finding
-from .findings import (
-    equal_scatter,
-    scatter_doubt,
-    scatter_finding,
-)
+from .findings import equal_scatter, scatter_doubt, scatter_finding
 from .gates import many_causes, not_the_only_ratio
 from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit

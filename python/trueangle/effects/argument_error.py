@@ -15,9 +15,7 @@ from ..joint.signals import Signals
 from .drawing import Drawing
 from .effect import Effect
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-)
+from .search import Array
 from .sidebands import Sidebands
 
 #: How far from -1 the coefficient may be found.

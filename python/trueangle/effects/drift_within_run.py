@@ -17,12 +17,7 @@ from ..estimation.whitening import drift_basis
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.layout import counted
-from .ambiguity import (
-    OWN_OF_VELOCITY,
-    RUNS_PER_LEVEL,
-    Ambiguity,
-    share_left,
-)
+from .ambiguity import OWN_OF_VELOCITY, RUNS_PER_LEVEL, Ambiguity, share_left
 from .backlash import Backlash
 from .drawing import Drawing
 from .effect import ALWAYS, Effect, Reported, Spots
@@ -30,10 +25,7 @@ from .latency import Latency
 from .missing_order import MissingOrder
 from .presliding_hysteresis import PreslidingHysteresis
 from .scale_error import ScaleError
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 from .thermal_drift import ThermalDrift
 from .zero_slip import ZeroSlip
 

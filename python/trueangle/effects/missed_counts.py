@@ -15,10 +15,7 @@ from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .drawing import Drawing
 from .effect import ALWAYS, Effect, Reported
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 #: Readings a step must have on either side of it within its run, up to the next step: a
 #: few readings that are off and come back are outliers, no lost counts.

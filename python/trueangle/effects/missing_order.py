@@ -7,25 +7,20 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..estimation.extension import Extension
+from ..estimation.lines import LEAST_ORDERS, LineBasis
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from .ambiguity import (
-    Ambiguity,
-)
+from ..runs.aliasing import may_pass
+from .ambiguity import Ambiguity
 from .drawing import Drawing
 from .effect import Effect, Reported, Spots
 from .scale_error import ScaleError
-from .search import (
-    Array,
-    Fitted,
-    known_orders,
-    line_parameters,
-    shows_line,
-)
+from .search import Array, Fitted, known_orders, line_parameters, shows_line
 from .torsional_compliance import TorsionalCompliance
 
 FREE_ANGLES = (
@@ -90,13 +85,18 @@ class MissingOrder(Effect):
         gains = np.where(shows_line(regression.signals, lines.orders), gains, 0.0)
         # At equal steps higher orders are the same numbers as low ones, but for the error by
         # which the angles miss the steps: what distinguishes them there is the noise.
-        # At few places, however they lie, lower orders make up any pattern: a higher one is there
-        # for what is known of the gear alone.
+        # At few places lower orders make up any pattern, and what they leave is no noise: a higher
+        # one explains more than one of these that may pass for it there, and than it would by
+        # chance if each place were one reading, or is there for what is known of the gear.
         signals = regression.signals
         if signals.grid is None:
-            known = np.array(known_orders(regression.belief))
+            passing = regression.cache.of_motion("lower", 0, lambda: _lower_alike(signals, lines))
+            lower = np.where(passing, gains[: passing.shape[1]], 0.0).max(axis=1, initial=0.0)
+            chance = penalties + 2.0 * np.log(signals.places)
             hidden = 2.0 * lines.orders > signals.places
-            hidden &= np.abs(lines.orders[:, None] - known).min(axis=1, initial=np.inf) > 1e-9
+            hidden &= gains < lower + chance * len(signals) / signals.places
+            known = np.round(known_orders(regression.belief), 9)
+            hidden &= np.isin(np.round(lines.orders, 9), known, invert=True)
         else:
             hidden = 2.0 * lines.orders > signals.grid.positions
         gains = np.where(hidden, 0.0, gains)
@@ -195,3 +195,12 @@ class MissingOrder(Effect):
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
         return ((self.shaft, self.order),)
+
+
+def _lower_alike(signals: Signals, lines: LineBasis) -> NDArray[np.bool_]:
+    """Which lower orders, that the places resolve, may pass for each order at these."""
+    turns = np.mod(signals.theta / (2.0 * np.pi), 1.0)
+    orders = np.round(lines.orders).astype(int)[:, None]
+    low = np.arange(1, min(signals.places // 2, LEAST_ORDERS) + 1)
+    apart = may_pass(turns, int(orders.max()) + low.size)
+    return np.asarray((apart[np.abs(orders - low)] | apart[orders + low]) & (low < orders))

@@ -15,21 +15,14 @@ from ..joint.lattice import aliases_of
 from ..joint.pattern import JointPattern, line_columns, lines_columns
 from ..joint.signals import Signals
 from ..support.deadline import current_deadline
-from .ambiguity import (
-    Ambiguity,
-)
+from .ambiguity import Ambiguity
 from .drawing import Drawing
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect, Reported, Spots
 from .missing_order import HIGHEST, MissingOrder
 from .orderspectrum import OrderSpectrum
 from .randomphase import RandomPhaseLine
-from .search import (
-    Array,
-    Fitted,
-    grid_ambiguity,
-    known_orders,
-)
+from .search import Array, Fitted, grid_ambiguity, known_orders
 
 #: Trial orders per resolution cell (one order over the turns of a run).
 OVERSAMPLING = 3

@@ -23,14 +23,7 @@ from .departures import spring_transitions
 from .drawing import Drawing
 from .effect import Effect, Reported
 from .latency import TWO_SPEEDS, Latency
-from .search import (
-    Array,
-    Fitted,
-    golden_maximum,
-    is_of_one_sign,
-    seen_beside,
-    tangent_covariance,
-)
+from .search import Array, Fitted, golden_maximum, is_of_one_sign, seen_beside, tangent_covariance
 
 _AFTER_REVERSAL = (
     "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "

@@ -14,20 +14,14 @@ from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import distinct
-from .ambiguity import (
-    RUNS_PER_LEVEL,
-    Ambiguity,
-)
+from .ambiguity import RUNS_PER_LEVEL, Ambiguity
 from .backlash import Backlash, goes_both_ways
 from .current_coupling import CurrentCoupling
 from .effect import ALWAYS, Effect, Reported
 from .latency import Latency
 from .missed_counts import MissedCounts
 from .presliding_hysteresis import PreslidingHysteresis
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance
 

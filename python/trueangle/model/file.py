@@ -16,12 +16,7 @@ from ..joint.shafts import Shaft
 from ..runs.rawchannels import CONSTANTS, Channels
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.decoding import (
-    MAX_ORDER,
-    json_value,
-    read_text,
-    shown_value,
-)
+from ..support.decoding import MAX_ORDER, json_value, read_text, shown_value
 from ..support.files import MODEL_BYTES
 from ..support.layout import counted
 from .model import HarmonicModel

@@ -102,13 +102,7 @@ class Positions:
         (False, True)
         """
         first = math.ceil(1.0 / self.span)
-        highest = max(highest, first)
-        # Cells of a turn for each order: within one it turns by a fifth of a radian at most.
-        cells = 1 << int(32 * highest).bit_length()
-        counts = np.bincount((self.turns * cells).astype(np.int64) % cells, minlength=cells)
-        coherence = np.abs(np.fft.rfft(counts)[first : highest + 1]) / len(self)
-        # Coherence from which an order far from another may pass for it at the positions.
-        return bool((coherence > 0.5).any())
+        return bool(may_pass(self.turns, max(highest, first))[first:].any())
 
     def describe(self) -> str:
         """The positions in words, as in ``36 positions, 10 deg apart``."""
@@ -121,6 +115,19 @@ class Positions:
             return f"{count}, {pitch} apart"
         shifts = ", ".join(f"{360.0 * (o - self.offsets[0]):.4g}" for o in self.offsets)
         return f"{count}: {len(self.offsets)} grids of {pitch}, shifted by {shifts} deg"
+
+
+def may_pass(turns: Array, highest: int) -> NDArray[np.bool_]:
+    """Whether orders m apart may pass for one another at places, for m = 0 to ``highest``.
+
+    ::
+
+        |mean exp(2πi m t)| > 1/2
+    """
+    # Cells of a turn for each order: within one it turns by a fifth of a radian at most.
+    cells = 1 << int(32 * highest).bit_length()
+    counts = np.bincount((turns * cells).astype(np.int64) % cells, minlength=cells)
+    return np.asarray(2.0 * np.abs(np.fft.rfft(counts)[: highest + 1]) > turns.size)
 
 
 def distinct_positions(

@@ -24,13 +24,7 @@ from .model import ENCODER, pattern_model, reference_free_calibration
 from .orderchoice import significant_orders
 from .projected import harmonic_rows, harmonic_unknowns
 from .recording import Recording
-from .result import (
-    Blind,
-    HeldOutPattern,
-    OrderEstimate,
-    SelfCalibration,
-    order_estimates,
-)
+from .result import Blind, HeldOutPattern, OrderEstimate, SelfCalibration, order_estimates
 from .verification import chance_of_parts, judged_patterns
 
 #: Heads whose readings differ by less than this share one zero (radians: half a degree).

@@ -27,13 +27,7 @@ from .model import ENCODER, pattern_model, reference_free_calibration
 from .orderchoice import significant_orders
 from .projected import NOT_SEEN, Unknown, harmonic_rows, harmonic_unknowns
 from .recording import Clampings, Recording, clampings_of
-from .result import (
-    ARCSEC,
-    Blind,
-    HeldOutPattern,
-    SelfCalibration,
-    order_estimates,
-)
+from .result import ARCSEC, Blind, HeldOutPattern, SelfCalibration, order_estimates
 
 OTHER: Final = "the other encoder"
 FACETS: Final = "the polygon's facets"

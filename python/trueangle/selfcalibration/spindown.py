@@ -20,12 +20,7 @@ from .loop import followed_orders, followed_share, widened_by_loop
 from .model import ENCODER, reference_free_calibration
 from .orderchoice import choose_selfcal_orders, highest_order, noise_spectrum_at
 from .recording import Recording
-from .result import (
-    Blind,
-    OrderEstimate,
-    SelfCalibration,
-    order_estimates,
-)
+from .result import Blind, OrderEstimate, SelfCalibration, order_estimates
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
 from .segments import SegmentReadings, cut_stretches
 from .steady import SteadyFit, fit_steady

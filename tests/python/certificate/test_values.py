@@ -10,14 +10,7 @@ import pytest
 from scipy import stats
 
 import trueangle as ta
-from trueangle.certificate import (
-    Budget,
-    Contribution,
-    Identity,
-    Specification,
-    certify,
-    conformity,
-)
+from trueangle.certificate import Budget, Contribution, Identity, Specification, certify, conformity
 from trueangle.certificate.values import (
     corrected_runs,
     is_of_these,

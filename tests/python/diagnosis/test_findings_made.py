@@ -10,11 +10,7 @@ import pytest
 import trueangle as ta
 from trueangle.diagnosis import findings as made
 from trueangle.diagnosis.confirmation import CONFIRMED, NOT_CONFIRMED
-from trueangle.diagnosis.findings import (
-    NOT_HELD_OUT,
-    findings_of,
-    reconsidered_findings,
-)
+from trueangle.diagnosis.findings import NOT_HELD_OUT, findings_of, reconsidered_findings
 from trueangle.diagnosis.gain import Gain, measure_gain
 from trueangle.diagnosis.goodness import Noise, Unexplained
 from trueangle.effects.ambiguity import Ambiguity

@@ -263,3 +263,18 @@ def test_a_sideband_at_a_line_of_another_shaft_is_in_doubt(
     if spot is not None:
         assert spot.because == f"{', '.join(shared)} as well as a sideband of order {carrier:g}"
         assert spot.causes == ("sidebands", "missing_order")
+
+
+@pytest.mark.parametrize("apart", [1.0, 7.3, 13.0])
+@pytest.mark.parametrize("order", [3, 40, 77])
+def test_mounts_of_a_polygon_show_orders_above_half_of_its_faces(order, apart):
+    """The joint's, where order 40 of 36 faces had been an error of the polygon at 13 deg."""
+    rng = np.random.default_rng([SEED, order])
+    runs = []
+    for mount in np.repeat([0.0, apart], 3):
+        theta = 10.0 * np.arange(36) + mount
+        error = 30.0 * np.sin(np.radians(order * theta + 17.0)) + rng.normal(0.0, 1.5, 36)
+        runs.append(ta.CalibrationRun(theta, theta + error / 3600.0, 360.0, mount=[mount] * 36))
+    (found,) = [f for f in ta.diagnose(runs, Simulation()).findings if f.confirmed]
+    assert (found.cause, found.parameters["output_order"].value) == ("missing_order", order)
+    assert abs(found.parameters["amplitude_arcsec"].value - 30.0) < 1.0

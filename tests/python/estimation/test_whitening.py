@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 
 from trueangle.estimation.blocks import BlockProducts, Blocks
-from trueangle.estimation.whitening import (
-    LagCorrelation,
-    RunEffect,
-    Whitener,
-    drift_basis,
-)
+from trueangle.estimation.whitening import LagCorrelation, RunEffect, Whitener, drift_basis
 
 from .dense import BOUNDS, CASES, N, case, covariance
 

@@ -17,13 +17,7 @@ from trueangle.joint.gear import (
     gear_orders,
     wanted_orders,
 )
-from trueangle.joint.shafts import (
-    MOST_ORDERS,
-    Shaft,
-    limited_orders,
-    resolve_orders,
-    shaft_cycles,
-)
+from trueangle.joint.shafts import MOST_ORDERS, Shaft, limited_orders, resolve_orders, shaft_cycles
 
 
 @pytest.mark.parametrize("ratio", [0.5, 30.0, 50.5, 100.0, 161.0])

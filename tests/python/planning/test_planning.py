@@ -9,13 +9,7 @@ import pytest
 
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, NoModelError
-from trueangle.planning import (
-    plan_encoder,
-    plan_mounts,
-    plan_tilts,
-    readings_needed,
-    wanted_orders,
-)
+from trueangle.planning import plan_encoder, plan_mounts, plan_tilts, readings_needed, wanted_orders
 from trueangle.planning.noisefactors import facet_noise_factor, mount_noise_factors, noise_factors
 
 # The tables give factors with two or three digits.

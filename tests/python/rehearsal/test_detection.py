@@ -35,13 +35,7 @@ from trueangle.rehearsal.detection import (
 )
 from trueangle.rehearsal.result import SHARES, rehearsed_cause
 from trueangle.rehearsal.trial import TrialOutcome
-from trueangle.simulation import (
-    Backlash,
-    HeteroscedasticNoise,
-    RunDesign,
-    Simulation,
-    simulate,
-)
+from trueangle.simulation import Backlash, HeteroscedasticNoise, RunDesign, Simulation, simulate
 
 TRIED = {-4: (0, 4), 0: (1, 6), 3: (4, 6), 6: (6, 7), 10: (5, 6)}
 

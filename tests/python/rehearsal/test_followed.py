@@ -20,14 +20,7 @@ from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
 from trueangle.planning.worth import effect_of_size
 from trueangle.rehearsal.trial import trial_outcome
-from trueangle.simulation import (
-    Harmonic,
-    Joint,
-    RunDesign,
-    Simulation,
-    simulate,
-    simulate_along,
-)
+from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate, simulate_along
 
 JOINT = Joint(50.0, "circular_spline", "motor")
 LINES = (Harmonic("output", 1, 14.0, 243.0), Harmonic("motor", 2, 10.0, 248.0))

@@ -5,12 +5,7 @@ import pytest
 from scipy import stats
 
 from trueangle.diagnosis.goodness import Leftover
-from trueangle.diagnosis.goodness.noise import (
-    _independent,
-    _PatternProducts,
-    _Sums,
-    estimate_noise,
-)
+from trueangle.diagnosis.goodness.noise import _independent, _PatternProducts, _Sums, estimate_noise
 from trueangle.diagnosis.goodness.periodogram import _whitened, periodogram
 from trueangle.diagnosis.goodness.place import _smallest, unit_sums
 from trueangle.diagnosis.goodness.scatter import normal_kurtosis, scatter_of_repeats
