@@ -91,8 +91,8 @@ def check_new_run(estimate: EvidenceEstimate, travel: Array) -> None:
         orders = ", ".join(f"{order:g}" for order in estimate.differing[:6])
         average = ", ".join(f"{order:g}" for order in estimate.present)
         raise NoModelError(
-            f"no model: runs differ in order{'s' * (',' in orders)} {orders}: a new run may get worse. "
-            f"Fit different joints separately; to fit the average anyway: `orders=[{average}]`"
+            f"no model: runs differ in order{'s' * (',' in orders)} {orders}: a new run may get "
+            f"worse. Fit different joints separately; to fit the average anyway: `orders=[{average}]`"
         )
 
 
