@@ -92,7 +92,7 @@ def check_new_run(estimate: EvidenceEstimate, travel: Array) -> None:
         average = ", ".join(f"{order:g}" for order in estimate.present)
         raise NoModelError(
             f"no model: runs differ in order{'s' * (',' in orders)} {orders}: a new run may get "
-            f"worse. Fit different joints separately; to fit the average anyway: `orders=[{average}]`"
+            f"worse. Fit different joints separately; for the average anyway: `orders=[{average}]`"
         )
 
 
