@@ -285,22 +285,22 @@ def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: f
     cells = round(1.0 / digit) if digit * MOST_CELLS > 1.0 else MOST_CELLS
     if abs(cells * digit - 1.0) > LEAST_STEP:
         cells = MOST_CELLS
-        # Counts behind finer digits repeat their moves.
-        if 10 * distinct(np.round(np.diff(values) * cells)).size > 9 * values.size:
+        # Counts behind finer digits repeat their moves, of three cells and more.
+        moves = (cell := np.round(np.diff(values) * cells))[cell > 0.0]
+        near = np.count_nonzero(moves == 1.0) > LINGERS * moves.size
+        if near or 10 * distinct(moves).size > 9 * moves.size:
             return 0.0
     digit = max(digit, 1.0 / cells)  # of finer digits the first are looked at
     places = distinct(np.mod(np.round(values * cells).astype(np.int64), cells))
-    marks = np.zeros(cells)
-    marks[places] = 1.0
+    marks = np.bincount(places, minlength=cells)
     coherence = np.abs(np.fft.rfft(marks)) / places.size
-    counts = np.arange(coherence.size)
-    possible = (counts * float(np.ptp(values)) > LEAST_STEPS) & (counts * digit < WIDEST_CELL)
-    possible &= cells * np.exp(-places.size * coherence**2) < BY_CHANCE
-    told = np.where(possible, coherence / np.sinc(counts * digit), 0.0)
-    top, lattices = int(np.argmax(coherence * possible)), np.flatnonzero(told > ON_COUNTS)
+    counts = np.flatnonzero(coherence**2 > np.log(cells / BY_CHANCE) / places.size)
+    counts = counts[(counts * np.ptp(values) > LEAST_STEPS) & (counts * digit < WIDEST_CELL)]
+    told = coherence[counts] / np.sinc(counts * digit)
+    top = int(counts[np.argmax(coherence[counts])]) if counts.size else 0
     # Its multiples are as coherent as a lattice; on even places aliases nearly are.
-    count = min((c for c in lattices.tolist() if top % c == 0), default=0)
-    if not count or (np.flatnonzero(told > told[count] - ALIKE) % count).any():
+    count = min((c for c in counts[told > ON_COUNTS].tolist() if top % c == 0), default=0)
+    if not count or (counts[told > told[counts == count] - ALIKE] % count).any():
         return 0.0
     of_design = abs(np.exp(2j * np.pi * count * true).mean()) > OF_DESIGN
     # Even places read with a slope are even, too: one place in each of adjacent cells.
