@@ -261,7 +261,7 @@ class Comparison(PlainResult):
 
     def _verdict(self, unit: ErrorUnit) -> list[str]:
         """Whether the models differ, by how much, and which of them to use."""
-        part = "the turn" if self.share == 1.0 else f"the {self.share:.0%} that both were fitted on"
+        part = "the turn" + f", where both were fitted ({self.share:.0%})" * (self.share < 1.0)
         size = f"{unit.text(self.rms_arcsec)} rms over {part}"
         if self.verdict is None or self.p is None:
             return [f"Difference {size}; not tested: that needs the covariance of both models."]
