@@ -89,16 +89,15 @@ class MissingOrder(Effect):
         # one explains more than one of these that may pass for it there, and than it would by
         # chance if each place were one reading, or is there for what is known of the gear.
         signals = regression.signals
-        if signals.grid is None:
+        positions = signals.places if signals.grid is None else signals.grid.positions
+        hidden = 2.0 * lines.orders > positions
+        if signals.grid is None and hidden.any():
             passing = regression.cache.of_motion("lower", 0, lambda: _lower_alike(signals, lines))
             lower = np.where(passing, gains[: passing.shape[1]], 0.0).max(axis=1, initial=0.0)
             chance = penalties + 2.0 * np.log(signals.places)
-            hidden = 2.0 * lines.orders > signals.places
             hidden &= gains < lower + chance * len(signals) / signals.places
             known = np.round(known_orders(regression.belief), 9)
             hidden &= np.isin(np.round(lines.orders, 9), known, invert=True)
-        else:
-            hidden = 2.0 * lines.orders > signals.grid.positions
         gains = np.where(hidden, 0.0, gains)
         best = int(np.argmax(gains - penalties))
         if gains[best] <= 0.0:
