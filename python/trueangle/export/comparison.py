@@ -95,9 +95,8 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
     statistic = wald_statistic(apart, scaled)
     every = sum(trace for trace, _ in weights) ** 2
     doubt = sum(trace**2 / freedom for trace, freedom in weights)
-    freedom = every / doubt if doubt > 0.0 else math.inf
     # Beyond this F is chi-squared to rounding.
-    freedom = min(freedom, 1e9)
+    freedom = min(every / doubt, 1e9) if doubt > 0.0 else 1e9
     scattered = any(m.fit is not None and m.fit.freedom is not None for m in (first, second))
     if scattered:
         p = _by_orders(apart, scaled, freedom)
@@ -118,10 +117,9 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
 def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
     """P-value of the order that differs most, with a covariance of unknown size and shape."""
-    orders = apart.size // 2
-    pairs = [slice(2 * i, 2 * i + 2) for i in range(orders)]
+    pairs = [slice(i, i + 2) for i in range(0, apart.size, 2)]
     least = min(_pair_tail(wald_statistic(apart[p], scaled[p, p]), freedom) for p in pairs)
-    return -math.expm1(orders * math.log1p(-least)) if least < 1.0 else 1.0
+    return -math.expm1(len(pairs) * math.log1p(-least)) if least < 1.0 else 1.0
 
 
 def _pair_tail(squares: float, freedom: float) -> float:
@@ -343,8 +341,10 @@ def compare(
     first, second = (m if isinstance(m, HarmonicModel) else load_model(m) for m in (a, b))
     if first.indicated_sign != second.indicated_sign:
         first, second = first.in_sensor_sense(), second.in_sensor_sense()
+    models = first, second
     one, two = TurnPattern(first), TurnPattern(second)
-    orders = sorted({*one.lines, *two.lines})
+    waves = one.waves, two.waves
+    orders = sorted({*waves[0], *waves[1]})
     if not (one.is_periodic and two.is_periodic) and first.argument != second.argument:
         raise ArgumentError(
             "one model follows the reference and one the indicated angle, and a shaft is not "
@@ -367,26 +367,29 @@ def compare(
     if not inside.any():
         raise ArgumentError("the models were fitted on different parts of the turn: none is common")
     zero = float(np.mean(difference)) if turns == 1 or at_readings else 0.0
+    spectrum = np.fft.rfft(difference - zero) * (2.0 / points)
+    variances = [_variances(model) for model in models]
     rows: list[dict[str, Any]] = []
     for order in orders:
         if same:
-            z = two.waves.get(order, 0j) - one.waves.get(order, 0j)
+            z = waves[1].get(order, 0j) - waves[0].get(order, 0j)
+        elif turns == 1:
+            z = 1j * complex(spectrum[round(order)])
         else:
             z = 2j * complex(np.mean((difference - zero) * np.exp(-2j * np.pi * order * x)))
         size = {"order": order, "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN}
         phase = math.degrees(cmath.phase(z)) % 360.0
-        of = "both" if order in one.lines and order in two.lines else "BA"[order in one.lines]
-        std = _std(first, second, order)
+        of = "both" if order in waves[0] and order in waves[1] else "BA"[order in waves[0]]
+        own = [each[order] for each in variances if order in each]
+        std = math.sqrt(sum(own)) * ARCSEC_PER_TURN if own else None
         rows.append({**size, "phase_deg": phase, "std_arcsec": std, "model": of})
-    tables = [
-        (m.fit.table, ARCSEC_PER_TURN / m.period) for m in (first, second) if m.fit and m.fit.table
-    ]
+    tables = [(m.fit.table, ARCSEC_PER_TURN / m.period) for m in models if m.fit and m.fit.table]
     kinds = dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
     terms = [kind for kind in kinds if _terms(first, kind) != _terms(second, kind)]
     each = [pattern.uncertainty_arcsec for pattern in (one, two)]
     if not inside.all():
         difference, zero = difference[inside], float(np.mean(difference[inside]))
-        each = [_spread(model, x[inside]) for model in (first, second)]
+        each = [_spread(model, x[inside]) for model in models]
     difference = difference - zero
     known = [std for std in each if std is not None]
     told: Equality | None = pattern_equality(first, second) if same else None
@@ -435,15 +438,12 @@ def _at_truth(pattern: TurnPattern, theta: Array) -> Array:
     return pattern.reading(theta) - theta - pattern.zero
 
 
-def _std(first: HarmonicModel, second: HarmonicModel, order: float) -> float | None:
-    """Of one coefficient of the difference, in arcsec."""
-    places = [(model, _coefficients(model).get(order)) for model in (first, second)]
-    variances = [
-        float(np.diag(model.covariance)[list(at[0])].mean()) / model.period**2
-        for model, at in places
-        if at is not None and model.covariance is not None
-    ]
-    return math.sqrt(sum(variances)) * ARCSEC_PER_TURN if variances else None
+def _variances(model: HarmonicModel) -> dict[float, float]:
+    """Of one coefficient of each output order, in turns squared; of none where none is known."""
+    if model.covariance is None:
+        return {}
+    each = np.diagonal(model.covariance) / model.period**2
+    return {k: float(each[list(rows)].mean()) for k, (rows, _) in _coefficients(model).items()}
 
 
 def _terms(model: HarmonicModel, kind: str) -> list[Any]:
