@@ -61,7 +61,8 @@ class _FleetReader(Decoder):
         self.table(content, dict.fromkeys(("format", "version", *_KEYS), True))
         prior = self.prior(content["prior"])
         self.turn = prior.period / ARCSEC_PER_TURN
-        common = self.table(content["common"], {"aligned": True, "orders": True}, "common")
+        known = {"aligned": True, "probability": False, "orders": True}
+        common = self.table(content["common"], known, "common")
         between = self.table(content["between"], {"orders": True}, "between")
         aligned = common["aligned"]
         if not isinstance(aligned, bool):
@@ -76,7 +77,7 @@ class _FleetReader(Decoder):
             scatter,
             self.row(Tolerance, content["tolerance"], "tolerance"),
             self.rows(HistoryRow, content["history"], "history", _MOST_UNITS),
-            aligned,
+            self.positive(common.get("probability", float(aligned)), "common.probability"),
             prior,
             tuple(self.each(content["notes"], "notes", self.text)),
         )

@@ -203,7 +203,7 @@ def _judged_fleet(
         ),
         bound,
         tuple(row for change in changes.values() for row in change.rows),
-        chosen.aligned,
+        chosen.probability,
         _prior(units, chosen),
         tuple(notes),
     )
@@ -226,7 +226,7 @@ def _prior(units: Units, chosen: SharedPattern) -> Prior:
         tuple(units.shafts),
         mean,
         variance,
-        max(2.0 * (kept - float(chosen.aligned)), 1.0),
+        max(2.0 * (kept - float(chosen.probability > 0.5)), 1.0),
         max(units.noise.variance, 1e-30 * units.period**2),
         units.noise.freedom,
         kept,

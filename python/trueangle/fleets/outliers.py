@@ -175,9 +175,8 @@ def _chances(
         free = np.where(inside, freedom - d, freedom)
         scale = np.maximum(rest, 0.0) / np.maximum(free, 1.0)
         f = np.where(apart > 0.0, apart / d / np.maximum(scale, 1e-300), 0.0)
-        # Degrees of freedom of the scale that an order needs.
-        told = free >= 4.0
-        chances.append(np.where(told, _f_tail(f, d, np.maximum(free, 1.0)), 1.0))
+        # Degrees of freedom of the scale that an order needs: 4.
+        chances.append(np.where(free >= 4.0, _f_tail(f, d, np.maximum(free, 1.0)), 1.0))
         sizes.append(np.sqrt(f * d))
     return np.column_stack(chances), np.column_stack(sizes)
 

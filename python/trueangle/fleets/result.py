@@ -139,8 +139,8 @@ class Fleet(PlainResult):
         What bounds the peak-to-peak of a share of all units.
     history : tuple of HistoryRow
         Of units calibrated again.
-    aligned : bool
-        Whether the units share a mounting zero: held-out units are predicted better by the mean.
+    aligned_probability : float
+        That the units share a mounting zero, and so a mean; `aligned` above one half.
     prior : Prior
         For a further unit: ``trueangle.fit(runs, prior=fleet)``.
     notes : tuple of str
@@ -151,9 +151,14 @@ class Fleet(PlainResult):
     between: tuple[BetweenOrder, ...]
     tolerance: Tolerance
     history: tuple[HistoryRow, ...]
-    aligned: bool
+    aligned_probability: float
     prior: Prior
     notes: tuple[str, ...] = ()
+
+    @property
+    def aligned(self) -> bool:
+        """Whether ``common`` is the mean of the units; else the units rather share none."""
+        return self.aligned_probability > 0.5
 
     @property
     def period(self) -> float:
@@ -177,7 +182,11 @@ class Fleet(PlainResult):
 
         return {
             "units": plain(self.units),
-            "common": {"aligned": self.aligned, "orders": plain(self.common)},
+            "common": {
+                "aligned": self.aligned,
+                "probability": self.aligned_probability,
+                "orders": plain(self.common),
+            },
             "between": {"orders": plain(self.between)},
             "tolerance": plain([self.tolerance])[0],
             "history": plain(self.history),
@@ -265,7 +274,8 @@ def _fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
 
 
 def _orders(fleet: Fleet, shown: ErrorUnit, scale: float) -> list[str]:
-    shared = "the mean of the units" if fleet.aligned else "none: the phases of units differ"
+    shared = "the mean of the units" if fleet.aligned else "none (random phases)"
+    shared += f", probability {0.5 + abs(fleet.aligned_probability - 0.5):.2g}"
     lines = [f"  common pattern: {shared}", "   order      common  between units  repeatability"]
     for common, between in zip(fleet.common, fleet.between, strict=True):
         again = (

@@ -263,8 +263,7 @@ class Spread:
             shaft.cycles_per_turn * order: prior.variance[2 * i : 2 * i + 2] * arcsec**2
             for i, (shaft, order) in enumerate((s, k) for s in prior.shafts for k in s.orders)
         }
-        wanted = tuple(of_order) if orders is None else limited_orders(orders)
-        wanted = tuple(float(order) for order in wanted)
+        wanted = tuple(map(float, of_order if orders is None else limited_orders(orders)))
         if not wanted or len(set(wanted)) < len(wanted) or min(wanted) <= 0.0:
             raise ArgumentError(f"orders must be positive and each named once, got {wanted!r}")
         free = np.full(2, np.inf)
@@ -274,23 +273,19 @@ class Spread:
         x = 2.0 * math.pi * np.outer(grid, wanted)
         lines = np.stack([np.cos(x), np.sin(x)], axis=2).reshape(count, -1)
         rows = np.hstack([np.ones((count, 1)), lines])
-        most = 0.0 if prior.run_variance is None else float(prior.run_variance.max())
-        between = math.sqrt(most) * arcsec
-        return cls(wanted, variance, float(scale), prior.units, grid, rows, between)
+        runs = 0.0 if prior.run_variance is None else float(prior.run_variance.max())
+        return cls(
+            wanted, variance, float(scale), prior.units, grid, rows, math.sqrt(runs) * arcsec
+        )
 
     def found(self, readings: int | None, uncertainty: float | None) -> _Places:
         """Places of the grid, each reading where the curve is known least, then exchanged."""
         covariance = self.covariance(np.zeros(0, dtype=np.int64))
         places: list[int] = []
-        while True:
-            if readings is not None and len(places) >= readings:
-                break
+        while readings is None or len(places) < readings:
             variances = self._variances(covariance)
-            if (
-                uncertainty is not None
-                and places
-                and COVERAGE**2 * float(variances.max()) <= uncertainty**2
-            ):
+            reached = COVERAGE * math.sqrt(float(variances.max()))
+            if uncertainty is not None and places and reached <= uncertainty:
                 break
             if len(places) >= _MOST:
                 raise ArgumentError(

@@ -22,7 +22,7 @@ from ..support.distributions import (
 )
 from .calibration import Calibration, order_columns, output_orders
 from .outliers import Deviates, deviates, level_by_order
-from .variance import BetweenUnits, held_out_score, reml
+from .variance import BetweenUnits, log_odds_of_mean, reml
 
 #: Fewest units for finding outliers: each is compared with the others.
 FEWEST: Final = 5
@@ -78,18 +78,19 @@ class Units:
 class SharedPattern(NamedTuple):
     """What the units that belong share, with or without a mean.
 
+    ``probability`` is that of a mean that is not zero.
     ``belong`` are the units that are no outliers; all of them where more are outliers than
     `FEW` allows: these are the tails of the design, of which the next unit may be one.
     """
 
-    aligned: bool
+    probability: float
     deviates: Deviates
     belong: NDArray[np.bool_]
     between: list[BetweenUnits]
 
 
 def shared_pattern(units: Units) -> SharedPattern:
-    """Outliers, and mean and variance of the others; the mean is zero where that predicts better.
+    """Outliers, and mean and variance of the others; the mean is zero where that is more probable.
 
     Both choices are compared on the same units: those that neither of them calls an outlier. An
     outlier that only one of them detects would else decide for all.
@@ -100,29 +101,16 @@ def shared_pattern(units: Units) -> SharedPattern:
     choices = (False, True) if n > 1 else (False,)
     values, own = [*units.values, units.log_left], [*units.own, units.log_left_own]
     found = {aligned: deviates(values, own, aligned, shares=shares) for aligned in choices}
-    judged = ~np.any([one.outlying for one in found.values()], axis=0)
-    if n < FEWEST:
-        judged[:] = True
-    scores = {aligned: _held_out(units, judged, aligned) for aligned in choices}
-    aligned = scores.get(True, -math.inf) > scores[False]
-    chosen = found[aligned]
-    if n < FEWEST:
-        chosen = chosen._replace(outlying=np.zeros(n, dtype=bool))
+    judged = ~np.any([one.outlying for one in found.values()], axis=0) | (n < FEWEST)
+    pairs = list(zip(units.values, units.own, strict=True))
+    odds = sum(log_odds_of_mean(v[judged], s[judged]) for v, s in pairs) if n > 1 else 0.0
+    probability = float(np.exp(-np.logaddexp(0.0, -odds)))
+    aligned = probability > 0.5
+    chosen = found[aligned]._replace(outlying=found[aligned].outlying & (n >= FEWEST))
     few = chosen.outlying.sum() <= max(1.0, FEW * n)
     kept = ~chosen.outlying if few else np.ones(n, dtype=bool)
-    pairs = zip(units.values, units.own, strict=True)
     between = [reml(values[kept], own[kept], aligned) for values, own in pairs]
-    return SharedPattern(aligned, chosen, kept, between)
-
-
-def _held_out(units: Units, judged: NDArray[np.bool_], aligned: bool) -> float:
-    """Logarithm of the density of every judged unit by the other judged ones, all orders."""
-    total = 0.0
-    for every, covariances in zip(units.values, units.own, strict=True):
-        values, own = every[judged], covariances[judged]
-        variance = reml(values, own, aligned).variance
-        total += float(held_out_score(values, own, variance, aligned).sum())
-    return total
+    return SharedPattern(probability, chosen, kept, between)
 
 
 #: Level at which units are found to differ in their noise.

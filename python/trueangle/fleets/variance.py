@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,6 +12,9 @@ from ..support.arrays import Array, median
 
 #: Median of the chi-squared distribution of two degrees of freedom, by its half.
 _HALF_MEDIAN: Final = float(np.log(2.0))
+
+#: Points and weights of Gauss from 0 to 1.
+_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(24) + np.array([[1.0], [0.0]])) / 2.0
 
 
 class BetweenUnits(NamedTuple):
@@ -111,21 +115,39 @@ def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Likelihood:
     return _Likelihood(score, max(0.5 * second, 1e-300), likelihood, mean, covariance)
 
 
-def held_out_score(values: Array, own: Array, variance: float, aligned: bool) -> Array:
-    """Logarithm of the density of every unit by the others', the variance taken from all.
+def log_odds_of_mean(values: Array, own: Array) -> float:
+    """Logarithm of the odds that the units share a mean, by one order; even before.
 
-    ``values`` and ``own`` are those of `reml`; where the units are ``aligned`` the others' mean
-    predicts one, else 0 does.
+    ::
+
+        b_u ~ N(μ, ρ v I + S_u),    μ ~ N(0, (1 - ρ) v I)
+
+    ``ρ`` is 1 where phases are random, and uniform from 0 to 1 where the units share a mean;
+    ``v`` is the mean square of cosine and sine less that of the noise in both.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 2)
+        Cosine and sine of the order of every unit.
+    own : ndarray, shape (n, 2, 2)
+        Covariance of each.
     """
-    spread = own + variance * np.eye(2)
-    mean = np.zeros_like(values)
-    if aligned:
-        inverse, _ = inverse_and_log_determinant(spread)
-        every = inverse.sum(axis=0)
-        pulls = np.einsum("uij,uj->ui", inverse, values)
-        others, _ = inverse_and_log_determinant(every - inverse)
-        mean = np.einsum("uij,uj->ui", others, pulls.sum(axis=0) - pulls)
-        spread = spread + others
-    apart = values - mean
-    inverse, logs = inverse_and_log_determinant(spread)
-    return np.asarray(-0.5 * (np.einsum("ui,uij,uj->u", apart, inverse, apart) + logs))
+    noise = float(np.mean(np.trace(own, axis1=1, axis2=2))) / 2.0
+    square = float(np.mean(values**2)) - noise
+    if square <= 0.0:
+        return 0.0
+    several = [
+        math.log(weight) + _log_density(values, own, share * square, (1.0 - share) * square)
+        for share, weight in zip(_NODES, _WEIGHTS, strict=True)
+    ]
+    return float(np.logaddexp.reduce(several)) - _log_density(values, own, square, 0.0)
+
+
+def _log_density(values: Array, own: Array, between: float, of_mean: float) -> float:
+    """Of units about a mean of the variance ``of_mean`` about zero."""
+    inverse, logs = inverse_and_log_determinant(own + between * np.eye(2))
+    pulls = np.einsum("uij,uj->ui", inverse, values)
+    pull = pulls.sum(axis=0)
+    shrunk, log = inverse_and_log_determinant(np.eye(2) + of_mean * inverse.sum(axis=0))
+    squares = float((values * pulls).sum() - of_mean * (pull @ shrunk @ pull))
+    return -0.5 * (squares + float(logs.sum() + log))

@@ -163,10 +163,11 @@ def test_the_table_of_units_is_as_wide_as_its_names(fleet, name):
 
 
 def test_words_of_a_fleet_are_those_of_its_numbers(fleet):
-    text = replace(fleet, notes=("first", "second"), aligned=True).summary()
+    text = replace(fleet, notes=("first", "second"), aligned_probability=0.97).summary()
     assert "  [1] first\n  [2] second" in text
-    assert "common pattern: the mean of the units" in text
-    assert "none: the phases of units differ" in replace(fleet, aligned=False).summary()
+    assert "common pattern: the mean of the units, probability 0.97" in text
+    alone = replace(fleet, aligned_probability=0.2).summary()
+    assert "none (random phases), probability 0.8" in alone
     (due,) = [row for row in fleet.history if row.next_calibration and not row.extrapolated]
     assert f"at most until {due.when[:10]}" in " ".join(text.split())
     # The unit of all is that of the largest.

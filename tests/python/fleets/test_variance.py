@@ -3,6 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import quad
+from scipy.linalg import block_diag
 from scipy.optimize import minimize
 from scipy.special import digamma, polygamma
 from scipy.stats import bartlett, chi2, kstest, multivariate_normal
@@ -12,7 +14,7 @@ from trueangle.errors import ArgumentError
 from trueangle.fleets.calibration import order_columns
 from trueangle.fleets.tolerance import tolerance_factor, tolerance_of, wilks_units
 from trueangle.fleets.units import noise_of
-from trueangle.fleets.variance import held_out_score, reml
+from trueangle.fleets.variance import log_odds_of_mean, reml
 from trueangle.support.plainresult import plain_row
 
 SEED = 52_010
@@ -127,40 +129,23 @@ def test_units_without_a_difference_have_none():
     assert reml(values, own, aligned=True).variance == 0.0
 
 
-def test_held_out_units_tell_whether_there_is_a_mean():
-    print("seed", SEED)
-    rng = np.random.default_rng(SEED + 3)
-    own = np.broadcast_to(0.01 * np.eye(2), (20, 2, 2))
-    for mean, better in ((0.0, False), (2.0, True)):
-        values = rng.normal(mean, 1.0, (20, 2))
-        scores = [
-            held_out_score(values, own, reml(values, own, aligned).variance, aligned).sum()
-            for aligned in (False, True)
-        ]
-        assert (scores[1] > scores[0]) == better
-
-
-@pytest.mark.parametrize("aligned", [False, True])
-def test_the_score_of_a_held_out_unit_is_its_density_by_the_others(aligned):
-    """By scipy, one after another: its own error, that between units, that of the others' mean."""
+@pytest.mark.parametrize("n", [2, 5])
+def test_the_odds_of_a_mean_are_those_of_the_units_together(n):
+    """By scipy: one density of all units, of which any two share the mean's variance."""
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 5)
-    roots = rng.normal(size=(7, 2, 2))
-    own = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(2)
-    values, variance = rng.normal(1.0, 2.0, (7, 2)), 0.6
-    wanted = []
-    for u in range(7):
-        mean, unsure = np.zeros(2), np.zeros((2, 2))
-        if aligned:
-            rest = [np.linalg.inv(own[v] + variance * np.eye(2)) for v in range(7) if v != u]
-            unsure = np.linalg.inv(sum(rest))
-            mean = unsure @ sum(
-                w @ x for w, x in zip(rest, np.delete(values, u, axis=0), strict=True)
-            )
-        spread = own[u] + variance * np.eye(2) + unsure
-        wanted.append(multivariate_normal(mean, spread).logpdf(values[u]) + np.log(2.0 * np.pi))
-    found = held_out_score(values, own, variance, aligned)
-    np.testing.assert_allclose(found, wanted, rtol=1e-9)
+    roots = rng.normal(size=(n, 2, 2))
+    own = 0.1 * (roots @ roots.transpose(0, 2, 1) + np.eye(2))
+    values = rng.normal(1.0, 2.0, (n, 2))
+    square = (values**2).mean() - np.trace(own, axis1=1, axis2=2).mean() / 2.0
+
+    def density(share):
+        units = (1.0 - share) * np.ones((n, n)) + share * np.eye(n)
+        spread = np.kron(square * units, np.eye(2)) + block_diag(*own)
+        return multivariate_normal(np.zeros(2 * n), spread).pdf(values.ravel())
+
+    wanted = quad(density, 0.0, 1.0)[0] / density(1.0)
+    assert log_odds_of_mean(values, own) == pytest.approx(np.log(wanted), abs=1e-3)
 
 
 def test_noise_that_differs_is_each_units_own_but_held_to_the_common():
