@@ -3,8 +3,8 @@
 //! Each value is standardized by those before it, so that what comes out is standard normal and
 //! independent where nothing changes (Hawkins 1987, self-starting cumulative sums).
 
-/// Values before the first that can be standardized.
-const FEWEST: f64 = 3.0;
+/// Degrees of freedom before the first value that can be standardized.
+const FEWEST: f64 = 2.0;
 
 /// Correlation of neighbours, in its standard errors, from which on it is taken out.
 const FOUND: f64 = 2.0;
@@ -26,21 +26,55 @@ impl Cusum {
     }
 }
 
-/// Standardizes each value by those before it.
+/// Standardizes each value by those before it, of known relative variances, since the last step.
+///
+/// A step starts another mean; scatter and correlation are those of all values about the mean of
+/// their own level.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Scale {
-    count: f64,
+    /// Values less means.
+    freedom: f64,
+    /// Values since the last step.
+    held: f64,
+    /// Sum of their inverse variances.
+    weight: f64,
     mean: f64,
     squares: f64,
-    last: f64,
+    last: Value,
     products: f64,
     lagged: f64,
 }
 
+/// A value with its variance, but for a factor common to all.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Value {
+    /// A coefficient of a window.
+    pub value: f64,
+    /// From the places of its readings.
+    pub variance: f64,
+}
+
+impl Value {
+    /// How far it is from a mean, in its deviations.
+    fn apart(self, mean: f64) -> f64 {
+        (self.value - mean) / self.variance.sqrt()
+    }
+}
+
 impl Scale {
-    /// Values so far.
-    pub fn count(&self) -> f64 {
-        self.count
+    /// Degrees of freedom of the scatter.
+    pub fn freedom(&self) -> f64 {
+        self.freedom
+    }
+
+    /// Values since the last step.
+    pub fn held(&self) -> f64 {
+        self.held
+    }
+
+    /// Sum of their inverse variances.
+    pub fn weight(&self) -> f64 {
+        self.weight
     }
 
     /// Their mean.
@@ -48,21 +82,30 @@ impl Scale {
         self.mean
     }
 
-    /// Their standard deviation.
+    /// Standard deviation of a value of their mean weight.
     pub fn std(&self) -> f64 {
-        (self.squares / (self.count - 1.0).max(1.0)).sqrt()
+        (self.factor() * self.held / self.weight).sqrt()
+    }
+
+    /// Variance of their mean.
+    pub fn spread(&self) -> f64 {
+        self.factor() / self.weight
+    }
+
+    /// The factor that all variances have in common.
+    pub fn factor(&self) -> f64 {
+        self.squares / self.freedom.max(1.0)
     }
 
     /// Takes a value in; what it is in standard deviations, 0 while too few are known.
-    pub fn add(&mut self, value: f64) -> f64 {
+    pub fn add(&mut self, value: Value) -> f64 {
         let correlation = self.correlation();
-        let standard = if self.count >= FEWEST && self.squares > 0.0 {
-            let apart = value - self.mean;
-            let before = self.last - self.mean;
-            let left = apart - correlation * before;
+        let standard = if self.freedom >= FEWEST && self.squares > 0.0 {
+            let before = self.last.apart(self.mean);
+            let left = value.apart(self.mean) - correlation * before;
             let share = (1.0 - correlation * correlation).sqrt();
-            let t = left / (share * self.std() * (1.0 + 1.0 / self.count).sqrt());
-            normal_of_student(t, self.count - 1.0)
+            let own = 1.0 + 1.0 / (self.weight * value.variance);
+            normal_of_student(left / (share * (self.factor() * own).sqrt()), self.freedom)
         } else {
             0.0
         };
@@ -71,26 +114,59 @@ impl Scale {
     }
 
     /// Takes a value in.
-    pub fn take(&mut self, value: f64) {
-        let before = self.last - self.mean;
-        let apart = value - self.mean;
-        if self.count > 0.0 {
-            self.products += apart * before;
-            self.lagged += before * before;
+    pub fn take(&mut self, value: Value) {
+        if self.held > 0.0 {
+            self.count_neighbours(value, self.last, 1.0);
+            self.freedom += 1.0;
         }
-        self.count += 1.0;
-        self.mean += apart / self.count;
-        self.squares += apart * (value - self.mean);
+        self.held += 1.0;
+        self.weight += value.variance.recip();
+        let before = self.mean;
+        self.mean += (value.value - before) / (self.weight * value.variance);
+        self.squares += value.apart(before) * value.apart(self.mean);
         self.last = value;
     }
 
-    /// The part of these values without the last of them, which have this mean and these squares
-    /// about it: how many, their mean, and their squares about that.
-    pub fn without(&self, count: f64, mean: f64, squares: f64) -> (f64, f64, f64) {
-        let before = self.count - count;
-        let own = (self.count * self.mean - count * mean) / before;
-        let between = (own - mean).powi(2) * before * count / self.count;
-        (before, own, (self.squares - squares - between).max(0.0))
+    /// As it was before its last values, and as it is where these came after a step. `values` are
+    /// the last ones, the newest first, and one that stays.
+    pub fn split(&self, values: &[Value]) -> (Self, Self) {
+        let mut before = *self;
+        for pair in values.windows(2) {
+            before.undo(pair[0], pair[1]);
+        }
+        let mut after = Self {
+            held: 0.0,
+            weight: 0.0,
+            mean: 0.0,
+            ..before
+        };
+        for &value in values[..values.len() - 1].iter().rev() {
+            after.take(value);
+        }
+        // They were picked for being far off: until others follow they count as one.
+        after.weight /= after.held;
+        after.held = 1.0;
+        (before, after)
+    }
+
+    /// Takes its last value out, which came after another one of its level.
+    fn undo(&mut self, value: Value, before: Value) {
+        self.freedom -= 1.0;
+        self.held -= 1.0;
+        self.weight -= value.variance.recip();
+        let after = self.mean;
+        self.mean -= (value.value - after) / (self.weight * value.variance);
+        self.squares -= value.apart(self.mean) * value.apart(after);
+        self.squares = self.squares.max(0.0);
+        self.count_neighbours(value, before, -1.0);
+        self.last = before;
+    }
+
+    /// Counts a value and the one before it among the neighbours, about the mean before it.
+    fn count_neighbours(&mut self, value: Value, before: Value, sign: f64) {
+        let before = before.apart(self.mean);
+        self.products += sign * value.apart(self.mean) * before;
+        self.lagged += sign * before * before;
     }
 
     /// By which the variance of a mean is greater than that of independent values.
@@ -101,11 +177,11 @@ impl Scale {
 
     /// That of neighbours where it is found, else 0.
     fn correlation(&self) -> f64 {
-        if self.count < 10.0 || self.lagged <= 0.0 {
+        if self.freedom < 9.0 || self.lagged <= 0.0 {
             return 0.0;
         }
         let found = self.products / self.lagged;
-        if found * self.count.sqrt() < FOUND {
+        if found * (self.freedom + 1.0).sqrt() < FOUND {
             return 0.0;
         }
         found.min(0.95)
@@ -148,7 +224,11 @@ mod tests {
     #[test]
     fn values_are_standardized_by_those_before() {
         let mut scale = Scale::default();
-        assert!((0..9).all(|_| scale.add(2.0) == 0.0));
+        let value = |value| Value {
+            value,
+            variance: 0.5,
+        };
+        assert!((0..9).all(|_| scale.add(value(2.0)) == 0.0));
         assert_eq!(scale.mean(), 2.0);
         let mut scale = Scale::default();
         let (mut state, mut value, mut sum, mut square) = (9u64, 0.0f64, 0.0, 0.0);
@@ -161,7 +241,10 @@ mod tests {
                 noise += (state >> 11) as f64 / (1u64 << 53) as f64;
             }
             value = 0.8 * value + noise;
-            let z = scale.add(value);
+            let z = scale.add(Value {
+                value,
+                variance: 0.5,
+            });
             if i >= 100 {
                 sum += z;
                 square += z * z;

@@ -1,6 +1,6 @@
 //! Windows one after the other, and a chart for every coefficient.
 
-use super::chart::{Cusum, Scale};
+use super::chart::{Cusum, Scale, Value};
 use super::recent::Recent;
 use super::window::Window;
 
@@ -68,9 +68,6 @@ pub struct Monitor {
     /// Variances of the model's own coefficients.
     known: Vec<f64>,
     charts: Vec<(Scale, Cusum)>,
-    /// Means and squares of plain coefficients of the first windows.
-    plain: Vec<Scale>,
-    /// Plain coefficients of the last windows.
     recent: Recent,
     steps: Scale,
     zero: Option<f64>,
@@ -91,7 +88,6 @@ impl Monitor {
             limits,
             known,
             charts: vec![Default::default(); size],
-            plain: vec![Scale::default(); size],
             recent: Recent::new(size),
             steps: Scale::default(),
             zero: None,
@@ -109,16 +105,16 @@ impl Monitor {
 
     /// Bytes of the state.
     pub fn bytes(&self) -> usize {
-        let charts = size_of_val(&self.charts[..]) + size_of_val(&self.plain[..]);
+        let charts = size_of_val(&self.charts[..]);
         let fixed = size_of::<Self>() + size_of_val(&self.known[..]);
         fixed + self.window.bytes() + self.recent.bytes() + charts
     }
 
     /// Mean and standard deviation of each coefficient's windows, and its sums.
     pub fn state(&self) -> Vec<[f64; 4]> {
-        let charts = self.plain.iter().zip(&self.charts);
+        let charts = self.charts.iter();
         charts
-            .map(|(plain, (_, sums))| [plain.mean(), plain.std(), sums.sums[0], sums.sums[1]])
+            .map(|(scale, chart)| [scale.mean(), scale.std(), chart.sums[0], chart.sums[1]])
             .collect()
     }
 
@@ -183,33 +179,36 @@ impl Monitor {
         let size = self.known.len();
         let (mut moved, mut unlike) = (Vec::new(), Vec::new());
         let mut statistics = vec![0.0; size + 1];
-        self.recent.add(&solved.coefficients[1..]);
-        for i in 0..size {
-            let (value, variance) = (solved.coefficients[i + 1], solved.variances[i + 1]);
-            let (scale, chart) = &mut self.charts[i];
-            let standard = scale.add(value / variance.sqrt());
-            statistics[i + 1] = chart.add(standard, limits.allowance);
-            self.plain[i].take(value);
+        let values = solved.coefficients.iter().zip(&solved.variances);
+        let values = values.map(|(&value, &variance)| Value { value, variance });
+        self.recent.add(values.clone().skip(1));
+        let rows = self.charts.iter_mut().zip(&mut statistics[1..]);
+        for (value, ((scale, chart), statistic)) in values.skip(1).zip(rows) {
+            *statistic = chart.add(scale.add(value), limits.allowance);
         }
         for order in 0..size / 2 {
             let pair = 2 * order..2 * order + 2;
             if pair.clone().any(|i| statistics[i + 1] > limits.sum) {
                 moved.push(self.moved(order));
-                for i in pair.filter(|&i| statistics[i + 1] > limits.sum) {
-                    self.charts[i].1 = Cusum::default();
-                }
             } else if self.windows as f64 == FIRST && pair.clone().any(|i| self.is_unlike(i)) {
                 unlike.push(self.unlike(order));
             }
         }
         let zero = solved.coefficients[0];
         if let Some(before) = self.last_zero {
-            let (count, std) = (self.steps.count(), self.steps.std());
-            statistics[0] = self.steps.add(zero - before).abs();
-            if count > FIRST && statistics[0] > limits.step {
+            let (held, std) = (self.steps.held(), self.steps.std());
+            let value = zero - before;
+            statistics[0] = self
+                .steps
+                .add(Value {
+                    value,
+                    variance: 1.0,
+                })
+                .abs();
+            if held > FIRST && statistics[0] > limits.step {
                 moved.push(Moved {
                     order: 0,
-                    size: zero - before,
+                    size: value,
                     std,
                     since: 1.0,
                 });
@@ -227,36 +226,39 @@ impl Monitor {
         })
     }
 
-    /// By how much an order moved in one of the last windows, against all before that.
-    fn moved(&self, order: usize) -> Moved {
+    /// By how much an order moved in one of the last windows, from its level before; its charts go
+    /// on from the new level, so that a step is one alarm.
+    fn moved(&mut self, order: usize) -> Moved {
         let pair = [2 * order, 2 * order + 1];
-        let (since, means, squares) = self.recent.change(pair, pair.map(|i| &self.plain[i]));
-        let mut found = [0.0; 2];
-        let mut variance = 0.0;
-        for (k, i) in pair.into_iter().enumerate() {
-            let (before, mean, left) = self.plain[i].without(since, means[k], squares[k]);
-            found[k] = means[k] - mean;
-            // Of the windows before alone: those after are few, and may go on moving.
-            let own = left / (before - 1.0).max(1.0) * (1.0 / since + 1.0 / before);
-            variance += 0.5 * own * self.charts[i].0.inflation();
+        let since = self.recent.change(pair, pair.map(|i| &self.charts[i].0));
+        let (mut size, mut variance) = (0.0f64, 0.0);
+        for i in pair {
+            let (before, after) = self.recent.split(i, since, &self.charts[i].0);
+            size = size.hypot(after.mean() - before.mean());
+            // Scatter of the windows before: those after are few, and may go on moving.
+            let own =
+                before.factor() * (1.0 / (since as f64 * after.weight()) + 1.0 / before.weight());
+            variance += 0.5 * own * before.inflation();
+            self.charts[i] = (after, Cusum::default());
         }
         Moved {
             order: order + 1,
-            size: found[0].hypot(found[1]),
+            size,
             std: variance.sqrt(),
-            since,
+            since: since as f64,
         }
     }
 
     /// Variance of the first windows' mean less the model's coefficient.
     fn spread(&self, i: usize) -> f64 {
-        self.known[i] + self.plain[i].std().powi(2) / FIRST
+        self.known[i] + self.charts[i].0.spread()
     }
 
     /// Whether the first windows' mean is not the model's.
     fn is_unlike(&self, i: usize) -> bool {
-        let t = self.plain[i].mean() / self.spread(i).sqrt();
-        super::chart::normal_of_student(t, FIRST - 1.0).abs() > self.limits.mean
+        let scale = &self.charts[i].0;
+        let t = scale.mean() / self.spread(i).sqrt();
+        super::chart::normal_of_student(t, scale.freedom()).abs() > self.limits.mean
     }
 
     /// How far the first windows' mean is from the model.
@@ -264,7 +266,7 @@ impl Monitor {
         let (a, b) = (2 * order, 2 * order + 1);
         Moved {
             order: order + 1,
-            size: self.plain[a].mean().hypot(self.plain[b].mean()),
+            size: self.charts[a].0.mean().hypot(self.charts[b].0.mean()),
             std: (0.5 * (self.spread(a) + self.spread(b))).sqrt(),
             since: FIRST,
         }

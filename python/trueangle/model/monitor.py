@@ -86,8 +86,9 @@ class Monitor(ShownResult):
 
         e_j - ε(x_j) = z_w + Σ_k a_kw cos k x_j + b_kw sin k x_j,
 
-    each coefficient is standardized by the windows before it (self-starting, Hawkins 1987; the
-    correlation of neighbours that is found is taken out), and a two-sided cumulative sum
+    each coefficient is standardized by the windows before it since its last step (self-starting,
+    Hawkins 1987; the correlation of neighbours that is found is taken out), and a two-sided
+    cumulative sum
 
     ::
 
@@ -117,8 +118,8 @@ class Monitor(ShownResult):
     -----
     About the cost of `Moments.update` a reading, for any number of orders, and 3
     microseconds a window of eight orders, however many readings it had. 64 kB at most for orders
-    up to 32. It never adapts to what it cannot name: an alarm restarts its chart, and the means
-    go on.
+    up to 32. It adapts to nothing without an alarm; an alarm restarts the charts of its order from
+    the level after the step, so that a step is reported once.
 
     Examples
     --------
@@ -184,7 +185,8 @@ class Monitor(ShownResult):
     def state(self) -> dict[str, Any]:
         """Windows so far, and mean, standard deviation and sums of the charts of each order.
 
-        Means and deviations are those of cosine and sine beyond the model's, in its unit.
+        Means since the last step and deviations are those of cosine and sine beyond the model's,
+        in its unit.
         """
         rows = np.array(self._core.state).reshape(-1, 2, 4)
         return {

@@ -114,15 +114,10 @@ def plan_mounts(
     >>> plan.mount_offsets_deg, round(plan.worst_noise_factor, 2)
     ((0.0, 2.14), 1.28)
     """
-    _check_count("positions", positions, 3)
     _check_count("mounts", mounts, 1)
-    limit = (positions - 1) // 2
-    if orders is None:
-        wanted = wanted_orders(gear_ratio, fixed_member, min(HIGHEST_LOW_ORDER, limit))
-        if gear_ratio is None:
-            wanted = _with_aliases(wanted, positions, mounts)
-    else:
-        wanted = tuple(sorted(set(limited_orders(orders))))
+    wanted, notes = _of_one_mount(gear_ratio, fixed_member, orders, positions)
+    if orders is None and gear_ratio is None:
+        wanted = _with_aliases(wanted, positions, mounts)
     if any(m != int(m) for m in wanted):
         raise ArgumentError(
             "a gear ratio whose orders are not whole needs several turns of a free reference "
@@ -142,7 +137,6 @@ def plan_mounts(
     offsets = search_offsets(positions, mounts, seen)
     factors = dict(zip(seen, mount_noise_factors(positions, offsets, seen).tolist(), strict=True))
     shifts, facet = search_shifts(positions, mounts)
-    notes = []
     hidden = [m for m in wanted if m not in factors]
     if hidden:
         notes.append(
@@ -187,18 +181,10 @@ def plan_tilts(
     >>> round(plan_tilts(100, tilt_arcsec=1200.0).worst_noise_factor, 2)
     1.7
     """
-    _check_count("positions", positions, 3)
     _check_count("tilts", tilts, 2)
     if not (math.isfinite(tilt_arcsec) and tilt_arcsec > 0.0):
         raise ArgumentError(f"tilt_arcsec must be positive, got {tilt_arcsec!r}")
-    limit = (positions - 1) // 2
-    low = min(HIGHEST_LOW_ORDER, limit)
-    wanted = (
-        wanted_orders(gear_ratio, fixed_member, low)
-        if orders is None
-        else tuple(limited_orders(orders))
-    )
-    _check_orders(wanted)
+    wanted, notes = _of_one_mount(gear_ratio, fixed_member, orders, positions)
     offsets = [float(o) for o in np.linspace(-tilt_arcsec, tilt_arcsec, tilts) / 3600.0]
     found = mount_noise_factors(positions, offsets, wanted).tolist()
     factors = dict(zip(wanted, found, strict=True))
@@ -220,6 +206,7 @@ def plan_tilts(
         tolerance_deg=offset_tolerance(positions, offsets, seen, worst),
         readings=_rounds(noise, standard_error, worst, positions * tilts),
         notes=(
+            *notes,
             "fit the autocollimator's scale as one more column: an error of 0.1 % is "
             f"{0.001 * tilt_arcsec:.2g} arcsec here",
             "the reference is not turned, so its own errors stay in the result",
@@ -278,6 +265,20 @@ def plan_encoder(
             "move both ways, at two speeds, loads and temperatures, over several turns",
         ),
     )
+
+
+def _of_one_mount(
+    gear_ratio: float | None, fixed_member: str, orders: Iterable[float] | None, positions: int
+) -> tuple[tuple[float, ...], list[str]]:
+    """The orders, by default the gear's and the low ones that one mount shows, with a note."""
+    _check_count("positions", positions, 3)
+    if orders is not None:
+        wanted = tuple(sorted(set(limited_orders(orders))))
+        _check_orders(wanted)
+        return wanted, []
+    low, most = (positions - 1) // 2, HIGHEST_LOW_ORDER
+    why = f"of orders 1-{most} those above {low} are omitted: one mount has too few positions"
+    return wanted_orders(gear_ratio, fixed_member, min(low, most)), [why] * (low < most)
 
 
 def _check_orders(wanted: tuple[float, ...]) -> None:

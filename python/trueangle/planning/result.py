@@ -104,9 +104,11 @@ class ArcPlan(PlainResult):
 _FACTOR = "  standard error of each order; 1 (ideal): as many readings over whole turns"
 
 
-def _worst(factor: float) -> str:
-    """The largest noise factor."""
-    return f"  worst order            standard error {factor:.2f} times the ideal"
+def _worst(plan: CalibrationPlan | SelfPlan) -> str:
+    """The largest noise factor, after the orders that no reading shows."""
+    lost = ", ".join(f"{k:g}" for k, f in plan.noise_factors.items() if not math.isfinite(f))
+    size = f"standard error {plan.worst_noise_factor:.2f} times the ideal"
+    return "  worst order            " + f"not determined: {lost}; others: " * bool(lost) + size
 
 
 def _factor(factor: float) -> str:
@@ -192,7 +194,7 @@ class CalibrationPlan(PlainResult):
                 start = f"start within +-{self.tolerance_deg:.2g} deg; note the angle to 0.01 deg"
                 lines.append(f"  tolerance              {start}")
         lines += [f"  note: {note}" for note in self.notes]
-        lines.append(_worst(self.worst_noise_factor))
+        lines.append(_worst(self))
         if math.isfinite(self.facet_noise_factor):
             # The attribute is relative to one mount, the ideal to as many readings.
             fitted = math.sqrt(len(self.mount_offsets_deg)) * self.facet_noise_factor
@@ -263,8 +265,7 @@ class SelfPlan(PlainResult):
     @property
     def worst_noise_factor(self) -> float:
         """The largest factor of the orders that are identifiable."""
-        seen = [f for f in self.noise_factors.values() if math.isfinite(f)]
-        return max(seen, default=math.inf)
+        return max((f for f in self.noise_factors.values() if math.isfinite(f)), default=math.inf)
 
     @property
     def blind_orders(self) -> tuple[float, ...]:
@@ -296,7 +297,7 @@ class SelfPlan(PlainResult):
             lines.append(f"  error by speed ratio   times the ideal: {table}")
             knots = f"at most {self.knots_per_turn:g} knots per turn, in the slowest part"
             lines.append(f"  spline of the motion   {knots}")
-        lines.append(_worst(self.worst_noise_factor))
+        lines.append(_worst(self))
         if self.given:
             given: Any = self.given
             names = ", ".join(f"{k:g}" for k in given["blind_orders"])

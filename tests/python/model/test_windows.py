@@ -132,7 +132,7 @@ def test_every_unit_raises_the_same_alarms():
 
 
 def test_readings_in_pieces_raise_the_alarms_of_all_at_once():
-    angle, error = readings(60)
+    angle, error = readings(120)
     error[PER * 50 :] += 0.004 * np.cos(np.radians(angle[PER * 50 :]))
     whole, pieces = ta.Monitor(model()), ta.Monitor(model())
     alarms = whole.update(angle, error)
@@ -225,13 +225,12 @@ def test_the_state_is_that_of_the_windows_and_of_a_mirrored_joint_the_mirrored_o
     windows = watch.windows_of(angle, error)
     other = mirrored.windows_of(angle, 2.0 * model().error(angle) - error)
     assert not any(one.alarm for one in (*windows, *other))
-    for k, (row, back) in enumerate(
-        zip(watch.state["orders"], mirrored.state["orders"], strict=True)
-    ):
+    both = zip(watch.state["orders"], mirrored.state["orders"], strict=True)
+    for k, (row, back) in enumerate(both):
         pairs = coefficients(windows, k)
         assert row["order"] == windows[0].orders[k].order
-        np.testing.assert_allclose(row["mean"], pairs.mean(axis=0), atol=1e-12)
-        np.testing.assert_allclose(row["std"], pairs.std(axis=0, ddof=1), rtol=1e-9)
+        np.testing.assert_allclose(row["mean"], pairs.mean(axis=0), rtol=0.02)
+        np.testing.assert_allclose(row["std"], pairs.std(axis=0, ddof=1), rtol=0.02)
         np.testing.assert_allclose(back["mean"], -np.array(row["mean"]), atol=BINNED)
         np.testing.assert_allclose(back["std"], row["std"], atol=BINNED)
         np.testing.assert_allclose(back["upper"], row["lower"], atol=SUMMED)
@@ -242,10 +241,11 @@ def test_the_state_is_that_of_the_windows_and_of_a_mirrored_joint_the_mirrored_o
 
 @pytest.mark.parametrize("scale", [1.0, 3600.0])
 def test_its_plain_values_are_its_own_with_sizes_times_the_scale(scale):
-    angle, error = readings(60)
+    angle, error = readings(120)
     error[PER * 50 :] += 0.004 * np.cos(np.radians(angle[PER * 50 :]))
     windows = ta.Monitor(model()).windows_of(angle, error, time=0.1 * np.arange(angle.size))
-    assert any(one.alarm for one in windows)
+    # A step is one event, however many windows follow it.
+    assert [one.window for one in windows if one.alarm] == [51]
     for one in windows:
         rows = [
             {"order": row.order, "amplitude_arcsec": scale * row.amplitude,

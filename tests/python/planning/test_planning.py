@@ -63,7 +63,10 @@ def test_the_fullest_class_says_how_many_mounts_are_needed(ratio, mounts):
 def test_order_360_of_ratio_120_is_invisible():
     plan = plan_mounts(120, 36, 4)
     assert plan.invisible_orders == (360,)
-    assert "360" in plan.notes[0]
+    assert "not determined: 360; others: standard" in plan.summary()
+    few = plan_mounts(None, 3, 6)  # more mounts than facets
+    assert len(few.facet_shifts) == 6
+    assert "above 1 are omitted" in few.notes[0]
 
 
 def test_classes_agree_with_the_dense_design():
@@ -194,10 +197,6 @@ def test_mounts_without_a_gear_tell_what_one_of_them_takes_for_one(positions, mo
     if orders is None:
         assert set(alike) <= set(plan.noise_factors)
         assert plan.worst_noise_factor == pytest.approx(1.0)
-
-
-def test_more_mounts_than_facets_are_planned():
-    assert len(plan_mounts(None, 3, 6).facet_shifts) == 6
 
 
 @pytest.mark.parametrize(("ratio", "hidden"), [(36.0, [36, 72]), (100.0, [])])

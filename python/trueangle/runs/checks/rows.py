@@ -183,13 +183,13 @@ def outliers(records: Iterable[Record], faults: Iterable[DataFault]) -> Iterator
                 yield stale_fault(record, name, far[held].tolist())
             far, before, distance = far[~held], before[~held], distance[~held]
         if far.size:
-            most = int(np.argmax(distance))
+            named = [f"reading {record.number(int(k))}" for k in far[:3]] + ["..."] * (far.size > 3)
+            size = f"{'up to ' * (far.size > 1)}{brief_number(float(distance.max()))} deg"
             yield record.fault(
                 "outliers",
                 far,
-                f"{counted(far, 'reading')} of {record.name} "
-                f"{'are' if far.size > 1 else 'is'} far off the neighbours in angle: reading "
-                f"{record.number(int(far[most]))} by {brief_number(float(distance[most]))} deg",
+                f"{counted(far, 'reading')} of {record.name} {'are' if far.size > 1 else 'is'} far "
+                f"off the neighbours in angle, by {size}: {', '.join(named)}",
                 "check these readings; `fit` and `diagnose` reject them",
             )
 
