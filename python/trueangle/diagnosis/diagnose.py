@@ -15,6 +15,7 @@ from ..estimation.regression import Regression
 from ..joint.signals import join_runs
 from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
+from ..runs.checks.rows import without_old_samples
 from ..runs.files import runs_of
 from ..runs.run import CalibrationRun
 from ..runs.source import ReadingOptions
@@ -147,7 +148,8 @@ def diagnose(
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:
         raise ArgumentError("no simulation: give one, or a log as `simulated=`")
-    with with_deadline(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
+    used = min(sum(map(len, measured)), MOST_READINGS)
+    with with_deadline(within, progress) as at, at.bounded(used), one_blas_thread():
         stated = Simulation() if sim is None else sim
         found = _diagnosis(measured, log, stated, gain)
         if log is None or not found.complete:
@@ -166,7 +168,8 @@ def _diagnosis(
     gain: bool,
 ) -> Diagnosis:
     at = current_deadline()
-    runs = measured if log is None else log.runs
+    faults = data_faults(records_of(measured))
+    runs, _ = without_old_samples(measured if log is None else log.runs)
     every = join_runs(runs)
     if len(every) < LEAST_READINGS:
         raise ArgumentError(
@@ -188,7 +191,6 @@ def _diagnosis(
     # What has no name may be what scatters.
     in_doubt = any(not factor.named_by for factor in factors)
     in_doubt |= any(spot.supported and not spot.common for spot in spots)
-    faults = data_faults(records_of(measured))
     spoilt = next((fault for fault in faults if fault.spoils_readings), None)
     for item in account.choice.scatter:
         if spoilt is not None or (in_doubt and item.size < OUTLYING_ANYWAY):
@@ -270,11 +272,6 @@ def _less_curves(regression: Regression, curves: list[Curve], sim: Simulation) -
 def not_confirmed_terms(findings: list[Finding]) -> list[int]:
     """Terms of the findings that are not confirmed."""
     return [k for finding in findings if not finding.confirmed for k in finding.group]
-
-
-def _used(runs: list[CalibrationRun]) -> int:
-    """Readings that a diagnosis uses."""
-    return min(sum(map(len, runs)), MOST_READINGS)
 
 
 def _incomplete(at: Deadline, gain: bool) -> str:

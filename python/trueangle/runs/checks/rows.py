@@ -72,18 +72,26 @@ def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
             )
 
 
+def without_old_samples(runs: Sequence[CalibrationRun]) -> tuple[list[CalibrationRun], list[str]]:
+    """Runs without readings that repeat the one before while the joint moves; what was omitted."""
+    kept, told = [], []
+    for run, record in zip(runs, records_of(runs), strict=True):
+        if old := [f for f in stuck_readings([record]) if f.fault == "stale_samples"]:
+            rows = np.delete(np.arange(len(run)), [row - 1 for f in old for row in f.rows])
+            run = run.part(rows)
+            told += [f"{fault.says}; they are omitted" for fault in old]
+        kept.append(run)
+    return kept, told
+
+
 def parted(runs: Sequence[CalibrationRun]) -> tuple[list[CalibrationRun], list[str]]:
     """Runs without old samples, in parts before and after every loss of counts, and what was done.
 
     From a loss on all is off by one more unknown, as from one run to the next.
     """
-    parts, told = [], []
-    for run, record in zip(runs, records_of(runs), strict=True):
-        if old := [f for f in stuck_readings([record]) if f.fault == "stale_samples"]:
-            rows = np.unique([row - 1 for fault in old for row in fault.rows])
-            run = run.part(np.delete(np.arange(len(run)), rows))
-            (record,) = records_of([run])
-            told += [f"{fault.says}; they are omitted" for fault in old]
+    kept, told = without_old_samples(runs)
+    parts = []
+    for run, record in zip(kept, records_of(kept), strict=True):
         faults = list(missed_counts([record]))
         told += [f"{f.says}; the readings from there have a separate zero" for f in faults]
         starts = [fault.rows[0] - 1 for fault in faults]

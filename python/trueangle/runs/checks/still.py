@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ...support.angles import wrap
 from ...support.arrays import Array, median, quantile
 from ...support.layout import counted
 from .fault import DataFault
@@ -101,21 +102,19 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
     times = 0
     passed = np.abs(other[last] - other[first])
     long = last - first >= _LEAST_STUCK
-    low, high = float(own.min()), float(own.max())
     for i in np.flatnonzero((passed >= channels.least) | long).tolist():
         a, b = int(first[i]), int(last[i])
-        if own[a] in (low, high) and long[i] and _is_limit(channels, a, b):
+        if own[a] in (own.min(), own.max()) and long[i] and _is_limit(channels, a, b):
             limit += range(a + 1, b + 1)
         elif passed[i] >= channels.least and _is_stale(channels, a, b):
             stale += range(a + 1, b + 1)
             times += 1
     if limit:
-        value = float(own[limit[0]])
         yield record.fault(
             "saturated_travel",
             limit,
-            f"the {name} angle of {record.name} stays at {value:g} deg, the end of its range, in "
-            f"{counted(limit, 'reading')} (first: {limit[0] + 1}) while the joint moves on",
+            f"the {name} angle of {record.name} stays at {own[limit[0]]:g} deg, the end of its "
+            f"range, in {counted(limit, 'reading')} (first: {limit[0] + 1}) while the joint moves",
             "remove these readings, or measure inside the range",
         )
     # Rows from which on stale readings are a fault of the data and no coincidence, where they come
@@ -131,7 +130,7 @@ def stale_fault(record: Record, name: str, at: Sequence[int]) -> DataFault:
         at,
         f"the {name} angle of {record.name} does not change in {counted(at, 'reading')} "
         f"(first: {record.number(at[0])}) while the joint moves: the log repeats old samples",
-        "remove these readings, or log each sample once, with its own time stamp",
+        "remove these readings, as `fit` and `diagnose` do, or log each sample once, with its time",
     )
 
 
@@ -161,9 +160,7 @@ def _least(own: Array, other: Array, lengths: NDArray[np.intp]) -> float:
 def _speeds(other: Array, time: Array | None) -> Array:
     """Travel per second, or per reading where time is not known."""
     steps = np.diff(other)
-    if time is None:
-        return steps
-    dt = np.diff(time)
+    dt = np.ones_like(steps) if time is None else np.diff(time)
     return np.divide(steps, dt, out=np.zeros_like(steps), where=dt > 0.0)
 
 
@@ -174,7 +171,7 @@ def _is_stale(c: _AnglePair, a: int, b: int) -> bool:
     missed = float(c.other[b] - c.other[a])
     near = _MADE_UP * abs(missed) + 0.4 * c.least
     made_up = float(c.own[b + 1] - c.own[b]) - float(c.other[b + 1] - c.other[b])
-    if abs(_turned(made_up - missed)) > near:
+    if abs(wrap(made_up - missed, 360.0)) > near:
         return False
     if b - a >= _LEAST_STUCK:  # excludes a joint that was at rest when the column went on
         passes = a == 0 or _passes(c, a, b - a, 1)
@@ -186,7 +183,7 @@ def _is_stale(c: _AnglePair, a: int, b: int) -> bool:
         return False
     if a > 0:
         before = float(c.own[a] - c.own[a - 1]) - float(c.other[a] - c.other[a - 1])
-        if abs(_turned(before)) <= near:
+        if abs(wrap(before, 360.0)) <= near:
             return True  # the reading before it was new
     size = np.abs(c.speed[a : b + 1])
     return b - a < _HELD and bool(size.min() >= _ALIKE * size.max())
@@ -243,8 +240,3 @@ def _passes(c: _AnglePair, at: int, length: int, end: int) -> bool:
 
 def _alike(x: float, y: float) -> bool:
     return x * y > 0.0 and _ALIKE <= x / y <= 1.0 / _ALIKE
-
-
-def _turned(x: float) -> float:
-    """Between half a turn back and half a turn ahead."""
-    return x - 360.0 * round(x / 360.0)

@@ -139,6 +139,6 @@ def test_the_place_and_the_first_row_are_told() -> None:
     limit, stale = stuck_readings([record])
     assert limit.rows == tuple(range(302, 401))
     assert "run warm stays at 310.5 deg, the end of its range, in 99 readings" in limit.says
-    assert "(first: 302) while the joint moves on" in limit.says
+    assert "(first: 302) while the joint moves" in limit.says
     assert stale.rows == (*range(101, 105), *range(201, 205))
     assert "run warm does not change in 8 readings (first: 101)" in stale.says
