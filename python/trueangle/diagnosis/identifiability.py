@@ -24,15 +24,10 @@ def ambiguity_of_cause(
     Where all that it may be have one form, and it is that, only its origin is open
     (`open_origins`): what is detected has a size, and is named.
     """
-    cause = extension.cause
-    if EFFECTS[cause].is_doubted:
-        for spot in spots:
-            # A detected crossing is not that of a delay.
-            may_be_told = spot.common or "turns_first" in extension.shape
-            if spot.hides(cause) and not (
-                may_be_told and EFFECTS[cause].told(extension, regression)
-            ):
-                return spot
+    cause, effect = extension.cause, EFFECTS[extension.cause]
+    for spot in spots:
+        if effect.is_doubted and spot.hides(cause) and not effect.told(extension, regression):
+            return spot
     found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]
     return min(found, key=lambda spot: blind_spot_place(DOUBTS, spot), default=None)
 

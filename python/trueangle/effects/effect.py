@@ -258,10 +258,7 @@ class Effect(TabledParameters):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether the readings show what the design alone does not promise to show.
-
-        Tested for a blind spot whose causes have a common form (`Ambiguity`).
-        """
+        """Whether the readings show what the design alone does not promise to show."""
         return False
 
     @classmethod

@@ -87,18 +87,12 @@ class Latency(Effect):
         if signals.velocity is None:
             yield cls.blind(UNTIMED)
             return
-        velocity = signals.velocity[:, None]
+        velocity, way = signals.velocity[:, None], signals.direction[:, None]
         if share_left(regression, velocity) < OWN_POWER:
             yield cls.blind("one speed in one direction (or at rest): a delay is part of the zero")
-        elif (
-            np.ptp(signals.direction) > 0.0
-            and share_left(regression, velocity, signals.direction[:, None]) < OWN_OF_VELOCITY
-        ):
-            yield cls.blind(
-                "one speed: a delay and play give the same readings",
-                Backlash,
-                first=False,
-            )
+        elif np.ptp(way) > 0.0 and share_left(regression, velocity, way) < OWN_OF_VELOCITY:
+            because = "one speed: a delay and play give the same readings"
+            yield cls.blind(because, Backlash, first=False)
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         return (LatencyTerm(self.delay_s),)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_sum
@@ -118,6 +119,11 @@ class ThermalDrift(FactorEffect):
             yield cls.blind("no temperature was recorded")
         elif np.ptp(temperature) < LEAST_KELVIN:
             yield cls.blind(f"the temperature varies by less than {LEAST_KELVIN:g} K")
+
+    @classmethod
+    def told(cls, extension: Extension, regression: Regression) -> bool:
+        """Whether a line changes with the temperature, which no zero of a run does."""
+        return any(t.cause == cls.kind and t.shape["what"] != "zero" for t in regression.terms)
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         return (
