@@ -119,6 +119,8 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     if notes and not diagnosis.complete:  # all that follows depends on it
         yield notes.pop(0)
     yield from ((f"Fault of the data, {fault}.", 2, 0) for fault in diagnosis.data_faults)
+    if any(fault.unusable for fault in diagnosis.data_faults):
+        return  # what such angles seem to follow is nothing
     rest, unknown = diagnosis.unexplained, list[Entry]()
     if rest is not None and rest.found:
         unknown = [(f"NOT UNDERSTOOD: {unit.text(rest.rms)} rms or more has no known cause.", 2, 0)]

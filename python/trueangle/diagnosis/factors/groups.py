@@ -164,13 +164,9 @@ def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator
         return
     sizes = _hats(knots_of(np.abs(x)))
 
-    def bent(power: float) -> Basis:
-        def curves(x: Array) -> Array:
-            size = np.abs(x) / top
-            lines = np.column_stack([np.sign(x), np.ones_like(x)])
-            return np.hstack([lines * size[:, None], lines * size[:, None] ** power])
-
-        return curves
+    def bent(x: Array, power: float = 2.0) -> Array:
+        signs = np.column_stack([np.sign(x), np.ones_like(x)])
+        return np.hstack([signs * (np.abs(x)[:, None] / top) ** p for p in (1.0, power)])
 
     def even(x: Array) -> Array:
         return sizes(np.abs(x))
@@ -182,8 +178,8 @@ def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator
     parts = [even, odd] if float(x.min()) < 0.0 < float(x.max()) else [even]
     # Of few levels these have no more columns.
     is_few = even(x[:1]).shape[1] <= FEW
-    yield Axis(factor, x, bent(0.5), grid, unit)
-    yield Axis(factor, x, bent(2.0), grid, unit, *(parts if is_few else [bent(2.0)]))
+    yield Axis(factor, x, lambda x: bent(x, 0.5), grid, unit)
+    yield Axis(factor, x, bent, grid, unit, *(parts if is_few else [bent]))
     yield Axis(factor, x, lambda x: np.hstack([part(x) for part in parts]), grid, unit)
 
 
