@@ -27,9 +27,9 @@ COARSE = 90.0
 
 #: Ratios by which angles in one unit differ from those in another.
 UNITS = {
-    "radians in a column of degrees": 180.0 / math.pi,
-    "turns in a column of degrees": 360.0,
-    "turns in a column of radians": 2.0 * math.pi,
+    ("radians", "degrees"): 180.0 / math.pi,
+    ("turns", "degrees"): 360.0,
+    ("turns", "radians"): 2.0 * math.pi,
 }
 
 #: Denominators of gear ratios that are offered, round ones first, and how near one must be.
@@ -101,10 +101,10 @@ def ratio_suggestion(ratio: float | None, agrees: float = AGREES) -> str:
 
     size = abs(ratio)
     sign = ", counted the other way" if ratio < 0.0 else ""
-    for text, factor in UNITS.items():
-        for name, value in ((f"indicated: {text}", 1.0 / factor), (f"reference: {text}", factor)):
-            if abs(size / value - 1.0) < 0.01:
-                return name + sign
+    one, two = ("indicated", "reference")[:: 1 if size < 1.0 else -1]
+    for (unit, of), factor in UNITS.items():
+        if min(abs(size * factor - 1.0), abs(size / factor - 1.0)) < 0.01:
+            return f"{one}: {unit} in a column of {of}, or {two}: {of} in a column of {unit}{sign}"
     for denominator in DENOMINATORS:
         best = Fraction(round(size * denominator), denominator)
         if best != 1 and abs(float(best) - size) < 2e-3 * size:
