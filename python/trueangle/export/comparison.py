@@ -271,7 +271,7 @@ class Comparison(PlainResult):
             # Where the difference is less than what either is uncertain by, that one is no judge.
             if max(a, b) < self.rms_arcsec:
                 use = "To see which one fits today: trueangle watch READINGS -m A, then B."
-        known = f"Standard error there: {unit.text(a)} rms of A, {unit.text(b)} of B."
+        known = f"Standard error of the curves: {unit.text(a)} rms of A, {unit.text(b)} of B."
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
         p = f"p {p}: probability of such a difference if only noise differs; a change is reported"
         return [first, f"{use} {known}", f"{p} below {self.false_alarms:g}."]

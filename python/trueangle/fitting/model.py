@@ -21,7 +21,7 @@ from ..runs.checks.record import records_of
 from ..runs.checks.rows import duplicate_rows, duplicate_runs, missed_counts
 from ..support.angles import arcsec, wrap
 from ..support.arrays import Array
-from ..support.display_units import error_unit, rms_text, sine_of_rms
+from ..support.display_units import error_unit, sine_of_rms
 from ..support.distributions import student_quantile
 from ..support.layout import counted, run_name
 from .decoded import track_readings
@@ -62,7 +62,6 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
 
         yield _sentence(Mismatch.of(channels, track_readings(fit.problem.runs)).says)
     yield from (_sentence(remark) for remark in fit.remarks)
-    yield from _not_noise(fit)
     records = records_of(fit.runs) if fit.moments is None else []
     for test in (channel_faults, duplicate_runs, duplicate_rows, missed_counts):
         yield from (_sentence(f"{fault.says}; {fault.mend}") for fault in test(records))
@@ -98,22 +97,6 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         yield from map(_sentence, fit.evidence.notes)
     elif (verified := _verified(fit)) is not None:
         yield _sentence(verified[1])
-
-
-def _not_noise(fit: FittedCoefficients) -> Iterable[str]:
-    """What is neither in the model nor noise of readings, where it is most of the residual."""
-    estimate = None if fit.evidence is None else fit.evidence.estimate
-    if estimate is None or len(fit.problem.runs) == 1:
-        return
-    # Noise of a reading is white, or correlated over the next ones.
-    noise = float(estimate.noise[:2].sum())
-    left = fit.residual_variance - noise
-    # A millionth of the error is rounding, of which an estimate knows no more.
-    if left > max(noise, 1e-12 * fit.rms_before**2):
-        yield (
-            f"Not corrected: {rms_text(math.sqrt(left), fit.problem.period)}, which is not "
-            "random noise. Run diagnose for its cause."
-        )
 
 
 def _undetermined(fit: FittedCoefficients) -> str:

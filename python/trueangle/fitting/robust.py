@@ -320,9 +320,8 @@ def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
     # A block of readings that the few orders cannot follow widens the scale it is judged by.
     many = ", which a robust fit does not withstand" if robust else ""
     return (
-        f"the residuals are {brief_number(scale / near)} times the difference of neighbours in "
-        f"angle: the model lacks an effect, or wrong readings are adjacent{many}; look at the "
-        "residuals"
+        f"neighbours in angle agree {brief_number(scale / near)} times better than the model fits "
+        f"them: it lacks an effect, or wrong readings are adjacent{many}; look at the residuals"
     )
 
 

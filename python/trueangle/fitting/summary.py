@@ -13,7 +13,7 @@ from ..support.distributions import student_quantile
 from ..support.layout import counted, laid_out
 from ..support.plainresult import finite_or_none, plain_fields
 from .model import FittedCoefficients
-from .orders.table import UNDETERMINED
+from .orders.table import FIRST, UNDETERMINED
 
 
 def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
@@ -40,7 +40,7 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     lines.append(f"{counted(model.orders, 'order')} fitted: error {sizes}.")
     if not freedom:
         lines.append("No reading tests it: as many unknowns as readings; read at more positions.")
-    lines += [*(note for note in fit.notes if note.startswith("Not corrected: ")), ""]
+    lines += [*(note for note in fit.notes if note.startswith(FIRST[1])), ""]
     if model.shafts or model.channels is None:
         lines += [*_table(fit, shown), ""]
     if model.channels is not None:

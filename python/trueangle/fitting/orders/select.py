@@ -22,7 +22,7 @@ from ..uncertainty import CovarianceKind, check_covariance
 from ..worth import of_worth
 from .choice import Method, selected_orders
 from .result import OrderSelection as OrderSelection
-from .table import UNDETERMINED
+from .table import FIRST, UNDETERMINED
 
 
 @told_kinds
@@ -156,5 +156,5 @@ def _as_fitted(
     except TrueAngleError:
         return selection
     found = selection if fit.selection is None else fit.selection
-    doubts = (note.rstrip(".") for note in fit.notes if note.startswith(UNDETERMINED))
-    return found.with_notes((*doubts, *found.notes))
+    doubts = (note.rstrip(".") for note in fit.notes if note.startswith(FIRST))
+    return found.with_notes(tuple(dict.fromkeys((*doubts, *found.notes))))

@@ -30,7 +30,7 @@ from .noise import ReadingVariance
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
 from .table import IN_MODEL, OrderRow
-from .verdicts import drift_of_a_sweep, row_with_verdict, selection_notes, verdict_reason
+from .verdicts import is_one_sweep, not_noise, row_with_verdict, selection_notes, verdict_reason
 from .zerogroups import (
     GROUPS,
     MOST_UNITS,
@@ -350,7 +350,7 @@ class EvidenceSelection:
             read = f"{counted(self.samples, 'reading')} at {counted(self.positions, 'position')}"
             return (
                 f"{read} are too few: 1 order and {counted(self.units, 'zero')} need "
-                f"{len(self.units) + 3} readings, a search for orders needs {FEW}; {plan}"
+                f"{len(self.units) + 3} readings; to search for orders take {FEW} or more; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
         likeliest = f"likeliest of {len(self.orders)}" if len(self.orders) > 1 else "only one"
@@ -360,7 +360,8 @@ class EvidenceSelection:
         if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
         chance = f"has a probability of only {brief_number(100.0 * best.probability)} %"
-        why = [f"{beside} {chance}", *drift_of_a_sweep(self.runs, estimate)]
+        drift = not_noise(self.runs, estimate) if is_one_sweep(self.runs) else []
+        why = [f"{beside} {chance}", *drift]
         if self.samples < FEW:
             why[0] = f"{counted(self.samples, 'reading')} are too few: {why[0]}"
             why.append(f"take {FEW} readings or more; {plan}")

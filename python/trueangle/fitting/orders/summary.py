@@ -10,7 +10,7 @@ from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
 from ...support.layout import counted, laid_out, order_ranges, wrapped_lines
 from ...support.plainresult import finite_or_none, plain_fields
-from .table import IN_MODEL, UNDETERMINED, OrderRow, OrderTable
+from .table import FIRST, IN_MODEL, UNDETERMINED, OrderRow, OrderTable
 
 
 def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> str:
@@ -21,14 +21,18 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     unit = selection_error_unit(selection, errors_in)
     noise_std = noise / math.sqrt(2.0 * max(1.0, selection.noise.degrees_of_freedom))
     retained = [row for row in selection.table if row.verdict in IN_MODEL]
-    head = f"NO ORDER RETAINED: {selection.reason}."
+    head = [f"NO ORDER RETAINED: {selection.reason}."]
     if retained:
-        sizes = f"{unit.number(before)} -> {unit.text(after)}"
-        head = f"{counted(retained, 'order')} retained: held-out error {sizes} rms "
-        head += f"({selection.holdout}); next: `ta.fit(...)`."
+        sizes = f"{unit.number(before)} -> {unit.text(after)} rms{', no lower' * (after >= before)}"
+        head = [f"{counted(retained, 'order')} retained: held-out error {sizes} "]
+        head[0] += f"({selection.holdout}); next: `ta.fit(...)`."
     read = f"{counted(selection.samples, 'reading')} in {counted(selection.runs, 'run')}"
-    notes = [note for note in selection.notes if note.startswith(UNDETERMINED)]
-    lines = [*(f"{note}." for note in notes), head, f"  {read}, {selection.positions.describe()}"]
+    notes = [note for note in selection.notes if note.startswith(FIRST)]
+    doubts = [f"Order {row.reason}" for row in selection.table if row.doubtful]
+    head += [f"{text}." for text in doubts + notes]
+    # What is not determined is the answer.
+    lines = sorted(head, key=lambda line: not line.startswith(UNDETERMINED))
+    lines.append(f"  {read}, {selection.positions.describe()}")
     if selection.table:
         size = f"{unit.number(noise, noise_std)} {unit.name}"
         lines.append(f"  noise of one reading  {size}{_source(selection, unit)}")
@@ -49,10 +53,9 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
                 lines += wrapped_lines(f"{verdict}: {reason}", 2, 2)
     lines += ["", *_explanations(selection)]
     for row in selection.table:
-        if row.doubtful or row.verdict == "reference":
-            text = row.reason if row.doubtful else f"{row.order:g}: {row.reason}"
-            lines += wrapped_lines(f"! {text}", 2)
-    for note in selection.notes[len(notes) :]:
+        if row.verdict == "reference":
+            lines += wrapped_lines(f"! {row.order:g}: {row.reason}", 2)
+    for note in (note for note in selection.notes if note not in notes):
         lines += wrapped_lines(f"note: {note}", 2)
     return laid_out(lines).rstrip()
 
@@ -117,7 +120,7 @@ def _source(selection: OrderTable, unit: ErrorUnit) -> str:
         # Least share of the noise's standard deviation from which a part of it is reported.
         least = 0.2 * arcsec(noise.standard_deviation, selection.period)
         parts = [
-            f"drift {unit.text(size)} over {min(length, longest):g} readings"
+            f"{unit.text(size)} correlated over {min(length, longest):g} readings"
             for size, length in zip(drifts, CORRELATION_TIMES, strict=True)
             if size > least
         ]

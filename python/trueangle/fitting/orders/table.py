@@ -24,6 +24,9 @@ LEFT_OUT: Final = ("reference", "too long", "negligible", "too steep", "rounding
 #: How a note begins that no model of these orders is worth using: the answer, so the first line.
 UNDETERMINED: Final = "NOT DETERMINED: "
 
+#: How those notes begin that come first, the next about what is no order and no noise of readings.
+FIRST: Final = (UNDETERMINED, "Not corrected: ")
+
 
 @dataclass(frozen=True)
 class OrderRow:

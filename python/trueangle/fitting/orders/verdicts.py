@@ -31,7 +31,7 @@ from ...support.angles import arcsec
 from ...support.display_units import brief_number, rms_text
 from .candidates import Candidates, choose_candidates
 from .result import OrderSelection
-from .table import OrderRow
+from .table import FIRST, OrderRow
 
 _VERDICTS: Final = {
     "noise": "is not significant",
@@ -42,8 +42,8 @@ _VERDICTS: Final = {
     "positions is the same each time: read at other positions, too",
     "shared": "is in the model, but over this travel it looks like other orders: only their sum is "
     "known; a whole turn separates them",
-    "in time": "follows the time better, as a line of a fixed frequency: a vibration or an "
-    "electrical line, and no error of a place",
+    "in time": "looks like a vibration or an electrical line in time: one fixed frequency explains "
+    "it better than the angle",
     "small": "has no prominent amplitude",
     "phase varies": "varies in phase from run to run",
     "too long": "cannot be distinguished from drift in time over so short a travel, passed once "
@@ -136,23 +136,30 @@ def _separating_offset(divisions: int, ratio: float | None, member: str) -> floa
     return plan.mount_offsets_deg[1]
 
 
-def drift_of_a_sweep(runs: Sequence[CalibrationRun], estimate: EvidenceEstimate) -> list[str]:
-    """What a single sweep took as drift, where it is most of what the orders leave.
+def is_one_sweep(runs: Sequence[CalibrationRun]) -> bool:
+    """Whether every place was passed once: drift in time is a function of the angle."""
+    return len(runs) == 1 and is_swept_once(runs[0])
+
+
+def not_noise(runs: Sequence[CalibrationRun], estimate: EvidenceEstimate) -> list[str]:
+    """What is neither orders nor noise of readings, where it is most of what the orders leave.
 
     A millionth of the error is rounding, of which an estimate knows no more.
     """
-    if len(runs) > 1 or not is_swept_once(runs[0]):
-        return []
     # Noise of a reading is white, or correlated over the next ones.
     noise, error = float(estimate.noise[:2].sum()), estimate.runs[0].error
     left = [read.error - estimate.curve(read.theta)[0] for read in estimate.runs]
     taken = float(np.var(np.concatenate([part - part.mean() for part in left]))) - noise
     if taken <= max(noise, 1e-12 * float(np.var(error))):
         return []
-    return [
-        f"not corrected: {rms_text(math.sqrt(taken), runs[0].period)}, taken as drift: one sweep "
-        "cannot distinguish it from a function of the angle; sweep back as well, and fit both runs"
-    ]
+    if is_one_sweep(runs):
+        why = "taken as drift: one sweep cannot distinguish it from a function of the angle; "
+        why += "sweep back as well, and fit both runs"
+    else:
+        by = f": runs differ in order {', '.join(f'{k:g}' for k in estimate.differing[:6])}"
+        by *= bool(estimate.differing)
+        why = f"which is not random noise{by}. Run diagnose for its cause"
+    return [f"{rms_text(math.sqrt(taken), runs[0].period)}, {why}"]
 
 
 def selection_notes(
@@ -166,7 +173,7 @@ def selection_notes(
         worst = arcsec(float(np.abs(closure).max()), selection.period)
         notes.append(f"after whole turns the error has changed by up to {worst:.3g} arcsec")
     if selection.estimate is not None:
-        notes += drift_of_a_sweep(runs, selection.estimate)
+        notes += [f"{FIRST[1]}{text}" for text in not_noise(runs, selection.estimate)]
     retained = [row for row in selection.table if row.retained]
     aliased = [row for row in retained if row.aliases]
     grid = positions.divisions is not None and len(positions.offsets) == 1

@@ -22,7 +22,7 @@ from ..run import CalibrationRun
 from ..source import checked_reading_options
 from .fault import DataFault
 
-#: Readings from which a choice among orders is sound: fewer are refused with a plan.
+#: Readings from which a search for orders is sound: of fewer more are asked for.
 FEW: Final = 20
 
 #: Readings that a run must have to be compared as a whole, and a level to be more than noise.

@@ -19,7 +19,7 @@ from .record import FEW, LEAST_READINGS, Record
 #: Levels are apart by so much at least: Nm, kelvin, degrees; of speeds a share of the fastest.
 _LEAST_GAP = {"torque": 0.05, "temperature": 1.0, "mount": 0.5, "speed": 0.05}
 #: What one run or two cannot show.
-REPEATABILITY = "what changes from run to run"
+REPEATABILITY = "differences between runs"
 
 _SIGNALS = ("torque", "temperature", "mount")
 
@@ -119,7 +119,7 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
         can.append("delay and filters (several speeds)")
     else:
         no(
-            "delay apart from reversal error or zero",
+            "a delay, separately from play and from a zero offset",
             "one speed",
             "runs at a second speed, 3 times as high",
         )
@@ -286,7 +286,7 @@ class Check(PlainResult):
         lines = [f"{found}; {use}: see the remedy."]
         if not self.data_faults:
             then = "next: `ta.fit(...)` or `ta.diagnose(...)`"
-            few = f"a search for orders needs {FEW} readings (here {e.readings})"
+            few = f"few readings to search for orders ({e.readings}): take {FEW} or more"
             lines = [f"No fault found in the data; {few if e.readings < FEW else then}."]
         for fault in self.data_faults:
             lines += wrapped_lines(f"{fault.fault}: {fault.says}.", 2)
