@@ -1,7 +1,7 @@
 """A blind exam of `diagnose`, written by someone who had not read its code.
 
 It holds 59 cases of 22 forms that no cause names, 25 named causes at four sizes, pairs of a strong
-and a weak one, and readings with nothing hidden: 142 cases a seed. Generators are numpy alone.
+and a weak one, and readings with nothing hidden: 144 cases a seed. Generators are numpy alone.
 Forms, designs, noise and the judge's rules are the stranger's and stay as they are; the one
 correction of a truth is `causes.SAME_FUNCTION`.
 

@@ -66,7 +66,7 @@ class Case:
 
 
 def cases() -> list[Case]:
-    """The 142 cases; a seed gives each other random numbers."""
+    """The 144 cases; a seed gives each other random numbers."""
     found: list[Case] = []
     index = count()
 

@@ -178,3 +178,8 @@ def square_wave_of_line20(runs: list[Run], rng: Generator) -> list[Array]:
 @form("full9 nine210", "load", "stiffening_compliance", "torsional_compliance")
 def clipped_load(runs: list[Run], rng: Generator) -> list[Array]:
     return [np.clip(run.torque, -2, 2) for run in runs]
+
+
+@form("full9 nine210", "speed direction", "", "latency")
+def speed_root(runs: list[Run], rng: Generator) -> list[Array]:
+    return [run.direction * np.sqrt(np.abs(run.velocity)) for run in runs]

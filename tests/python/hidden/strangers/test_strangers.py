@@ -1,4 +1,4 @@
-"""The strangers' exam at a handful of cases; `make exam` asks all 142 of two seeds.
+"""The strangers' exam at a handful of cases; `make exam` asks all 144 of two seeds.
 
 The seed of the ordinary run is fixed; what was wrong at it is in docs/howto/trust.md.
 """
@@ -30,7 +30,7 @@ TRUTHFUL_FORMS = 0.92
 FALSE_NAMES = 0.03
 
 #: Cases of the ordinary run, about a second each: forms, causes, a pair and nothing.
-FEW = (1, 38, 41, 44, 82, 89, 98, 104, 121, 139)
+FEW = (1, 38, 41, 44, 59, 84, 91, 100, 106, 123, 141)
 
 
 def ask(case: Case, seed: int) -> Verdict:
@@ -75,14 +75,8 @@ def test_answers() -> None:
 
 def test_each_group_has_its_cases() -> None:
     groups = Counter(case.group for case in cases())
-    assert groups == {
-        "form": 59,
-        "usual": 36,
-        "small": 10,
-        "large": 9,
-        "pair": 10,
-        "nothing": 18,
-    }
+    sizes = {"form": 61, "usual": 36, "small": 10, "large": 9, "pair": 10, "nothing": 18}
+    assert groups == sizes
 
 
 def account(*confirmed: str, factors: tuple[str, ...] = ()) -> dict[str, object]:
