@@ -158,7 +158,7 @@ def not_noise(runs: Sequence[CalibrationRun], estimate: EvidenceEstimate) -> lis
     else:
         by = f": runs differ in order {', '.join(f'{k:g}' for k in estimate.differing[:6])}"
         by *= bool(estimate.differing)
-        why = f"which is not random noise{by}. Run diagnose for its cause"
+        why = f"which is not noise of single readings{by}. Run diagnose for its cause"
     return [f"{rms_text(math.sqrt(taken), runs[0].period)}, {why}"]
 
 
