@@ -76,55 +76,115 @@ fn a_window_is_the_least_squares_of_its_readings() {
     }
 }
 
-/// Correlation of neighbours about the mean before each, where it is found.
-fn correlation(values: &[f64]) -> f64 {
-    let (mut products, mut squares) = (0.0, 0.0);
-    for j in 1..values.len() {
-        let middle = mean(&values[..j]);
-        products += (values[j] - middle) * (values[j - 1] - middle);
-        squares += (values[j - 1] - middle).powi(2);
+/// Values of one level with their variances; the first ones count as one where they came by a step.
+#[derive(Clone, Default)]
+struct Level {
+    values: Vec<(f64, f64)>,
+    first: usize,
+}
+
+impl Level {
+    /// Weight and mean of the values before one.
+    fn before(&self, end: usize) -> (f64, f64) {
+        let parts = self.values[..end].iter().enumerate();
+        let weighed = parts.map(|(j, &(x, v))| {
+            let shared = if j < self.first && end >= self.first {
+                self.first
+            } else {
+                1
+            };
+            (x, 1.0 / v / shared as f64)
+        });
+        let (weight, sum) = weighed.fold((0.0, 0.0), |(w, s), (x, one)| (w + one, s + one * x));
+        (weight, sum / weight)
     }
+
+    fn all(&self) -> (f64, f64) {
+        self.before(self.values.len())
+    }
+
+    /// Squares about the means: of the first values about theirs, and of what follows.
+    fn squares(&self) -> f64 {
+        let (_, own) = self.before(self.first);
+        let (_, every) = self.all();
+        let (mut squares, mut weight) = (0.0, 0.0);
+        for (j, &(x, v)) in self.values.iter().enumerate() {
+            let middle = if j < self.first { own } else { every };
+            squares += (x - middle).powi(2) / v;
+            weight += if j < self.first { 1.0 / v } else { 0.0 };
+        }
+        match self.first {
+            0 => squares,
+            n => squares + (own - every).powi(2) * weight / n as f64,
+        }
+    }
+
+    /// Products of neighbours about the mean before each, and squares of the former.
+    fn neighbours(&self) -> (f64, f64) {
+        let (mut products, mut squares) = (0.0, 0.0);
+        for j in 1..self.values.len() {
+            let (_, middle) = self.before(j);
+            let [a, b] = [j, j - 1].map(|k| (self.values[k].0 - middle) / self.values[k].1.sqrt());
+            products += a * b;
+            squares += b * b;
+        }
+        (products, squares)
+    }
+}
+
+fn freedom(levels: &[Level]) -> f64 {
+    levels.iter().map(|l| l.values.len() as f64 - 1.0).sum()
+}
+
+fn factor(levels: &[Level]) -> f64 {
+    levels.iter().map(Level::squares).sum::<f64>() / freedom(levels).max(1.0)
+}
+
+/// Correlation of neighbours, where it is found.
+fn correlation(levels: &[Level]) -> f64 {
+    let both = levels.iter().map(Level::neighbours);
+    let (products, squares) = both.fold((0.0, 0.0), |(p, s), (a, b)| (p + a, s + b));
     let found = products / squares;
-    let counts = values.len() >= 10 && found * (values.len() as f64).sqrt() >= 2.0;
+    let counts = freedom(levels) >= 9.0 && found * (freedom(levels) + 1.0).sqrt() >= 2.0;
     if counts { found.min(0.95) } else { 0.0 }
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn squares(values: &[f64]) -> f64 {
-    values.iter().map(|v| (v - mean(values)).powi(2)).sum()
-}
-
 /// The last value by those before it.
-fn standard(values: &[f64]) -> f64 {
-    let (&last, before) = values.split_last().unwrap();
-    if before.len() < 3 {
+fn standard(levels: &[Level]) -> f64 {
+    let mut before = levels.to_vec();
+    let level = before.last_mut().unwrap();
+    let (last, variance) = level.values.pop().unwrap();
+    let Some(&(previous, own)) = level.values.last() else {
+        return 0.0;
+    };
+    let ((weight, mean), n) = (level.all(), freedom(&before));
+    if n < 2.0 {
         return 0.0;
     }
-    let n = before.len() as f64;
-    let c = correlation(before);
-    let apart = last - mean(before) - c * (before[before.len() - 1] - mean(before));
-    let std = (squares(before) / (n - 1.0)).sqrt();
-    normal_of_student(
-        apart / (std * ((1.0 - c * c) * (1.0 + 1.0 / n)).sqrt()),
-        n - 1.0,
-    )
+    let c = correlation(&before);
+    let apart = (last - mean) / variance.sqrt() - c * (previous - mean) / own.sqrt();
+    let std = (factor(&before) * (1.0 - c * c) * (1.0 + 1.0 / (weight * variance))).sqrt();
+    normal_of_student(apart / std, n)
 }
 
-/// Windows since the split that leaves least squares of both coefficients.
-fn since(a: &[f64], b: &[f64]) -> usize {
-    let left = |k: usize| {
-        let at = a.len() - k;
-        [a, b]
-            .iter()
-            .map(|v| squares(&v[..at]) + squares(&v[at..]))
-            .sum::<f64>()
+/// Windows since the split of a level that leaves least squares of both coefficients.
+fn since(a: &Level, b: &Level) -> usize {
+    let taken = |k: usize| {
+        let parts = [a, b].map(|level| {
+            let ((whole, mean), at) = (level.all(), level.values.len() - k);
+            let new = Level {
+                values: level.values[at..].to_vec(),
+                first: 0,
+            };
+            let (own, middle) = new.all();
+            (middle - mean).powi(2) * own * whole / (whole - own)
+        });
+        parts[0] + parts[1]
     };
-    let most = 32.min(a.len() - 3);
+    let held = a.values.len() - a.first.saturating_sub(1);
+    let most = 31.min(held.saturating_sub(3)).max(1);
     (1..=most)
-        .min_by(|&j, &k| left(j).total_cmp(&left(k)))
+        .max_by(|&j, &k| taken(j).total_cmp(&taken(k)).then(k.cmp(&j)))
         .unwrap()
 }
 
@@ -173,9 +233,9 @@ fn charts_are_those_of_all_windows() {
     for seed in 1..4 {
         let (turns, errors, closed) = watched(seed);
         assert!(closed.len() > 55);
-        let mut plain = vec![Vec::new(); 7];
-        let (mut scaled, mut sums) = (vec![Vec::new(); 6], [[0.0_f64; 2]; 6]);
-        let (mut start, mut steps, mut told) = (0, Vec::new(), Vec::new());
+        let mut zeros = Vec::new();
+        let (mut charts, mut sums) = (vec![vec![Level::default()]; 6], [[0.0_f64; 2]; 6]);
+        let (mut start, mut steps, mut told) = (0, vec![Level::default()], Vec::new());
         for (k, one) in closed.iter().enumerate() {
             let part = start..one.reading + 1;
             start = part.end;
@@ -191,11 +251,12 @@ fn charts_are_those_of_all_windows() {
                     (value - expected[i]).abs() < 2.0 * BINNED,
                     "seed {seed}, {k}, {i}"
                 );
-                plain[i].push(one.coefficients[i]);
             }
+            zeros.push(one.coefficients[0]);
             for i in 0..6 {
-                scaled[i].push(one.coefficients[i + 1] / variances[i + 1].sqrt());
-                let z = standard(&scaled[i]);
+                let value = (one.coefficients[i + 1], variances[i + 1]);
+                charts[i].last_mut().unwrap().values.push(value);
+                let z = standard(&charts[i]);
                 for (sum, signed) in sums[i].iter_mut().zip([z, -z]) {
                     *sum = (*sum + signed - LIMITS.allowance).max(0.0);
                 }
@@ -211,29 +272,32 @@ fn charts_are_those_of_all_windows() {
                 if one.statistics[a + 1].max(one.statistics[b + 1]) > LIMITS.sum {
                     orders.push(order + 1);
                     let said = one.moved.iter().find(|m| m.order == order + 1).unwrap();
-                    let back = since(&plain[a + 1], &plain[b + 1]);
+                    let levels = [a, b].map(|i| charts[i].last().unwrap());
+                    let back = since(levels[0], levels[1]);
                     assert_eq!(said.since, back as f64, "seed {seed}, window {k}");
                     let (mut size, mut variance) = (0.0, 0.0);
                     for i in [a, b] {
-                        let (old, new) = plain[i + 1].split_at(k + 1 - back);
-                        let (n, c) = (old.len() as f64, correlation(&scaled[i]));
-                        size += (mean(new) - mean(old)).powi(2);
-                        variance += 0.5 * squares(old) / (n - 1.0).max(1.0)
-                            * (1.0 / said.since + 1.0 / n)
-                            * (1.0 + c)
-                            / (1.0 - c);
-                        if one.statistics[i + 1] > LIMITS.sum {
-                            sums[i] = [0.0; 2];
-                        }
+                        let old = charts[i].last_mut().unwrap();
+                        let values = old.values.split_off(old.values.len() - back);
+                        let (weight, mean) = old.all();
+                        let c = correlation(&charts[i]);
+                        let spread = factor(&charts[i]) * (1.0 + c) / (1.0 - c);
+                        charts[i].push(Level {
+                            values,
+                            first: back,
+                        });
+                        let (own, middle) = charts[i].last().unwrap().all();
+                        size += (middle - mean).powi(2);
+                        variance += 0.5 * spread * (1.0 / (back as f64 * own) + 1.0 / weight);
+                        sums[i] = [0.0; 2];
                     }
                     let off = (said.size - size.sqrt()).abs() + (said.std - variance.sqrt()).abs();
                     assert!(off < 1e-4, "seed {seed}, window {k}: {said:?}");
                 }
             }
-            if let [.., before, last] = plain[0][..] {
-                let deviation = (squares(&steps) / (steps.len() as f64 - 1.0).max(1.0)).sqrt();
-                let known = steps.len();
-                steps.push(last - before);
+            if let [.., before, last] = zeros[..] {
+                let (deviation, known) = (factor(&steps).sqrt(), steps[0].values.len());
+                steps[0].values.push((last - before, 1.0));
                 let size = standard(&steps).abs();
                 assert!((one.statistics[0] - size).abs() < 1e-9 * (1.0 + size));
                 if known > 8 && size > LIMITS.step {
@@ -248,17 +312,18 @@ fn charts_are_those_of_all_windows() {
             let found: Vec<usize> = one.moved.iter().map(|m| m.order).collect();
             assert_eq!(found, orders, "seed {seed}, window {k}");
             told.extend(orders);
-            let spread = |i: usize| KNOWN[i] + squares(&plain[i + 1]) / 7.0 / 8.0;
-            let unlike = |i: usize| {
-                normal_of_student(mean(&plain[i + 1]) / spread(i).sqrt(), 7.0).abs() > LIMITS.mean
-            };
+            let mean = |i: usize| charts[i].last().unwrap().all().1;
+            let spread =
+                |i: usize| KNOWN[i] + factor(&charts[i]) / charts[i].last().unwrap().all().0;
+            let unlike =
+                |i: usize| normal_of_student(mean(i) / spread(i).sqrt(), 7.0).abs() > LIMITS.mean;
             let mut apart = Vec::new();
             for order in 0..3 {
                 let (a, b) = (2 * order, 2 * order + 1);
                 if k == 7 && !found.contains(&(order + 1)) && (unlike(a) || unlike(b)) {
                     apart.push(order + 1);
                     let said = one.unlike.iter().find(|m| m.order == order + 1).unwrap();
-                    let size = mean(&plain[a + 1]).hypot(mean(&plain[b + 1]));
+                    let size = mean(a).hypot(mean(b));
                     let std = (0.5 * (spread(a) + spread(b))).sqrt();
                     assert!((said.size - size).abs() + (said.std - std).abs() < 1e-9);
                     assert_eq!(said.since, 8.0);
