@@ -100,7 +100,7 @@ class PreparedData:
         then = every
         if delay is not None:
             then, error = error_before_delay(every, error, delay.seconds)
-        rows = every.directed
+        rows = _directed(every)
         rows = rows[_subsample(rows.size)]
         if rows.size == len(every):
             return cls(sim, ratio, delay, every, then, error, None)
@@ -262,6 +262,15 @@ def _unweighing(regression: Regression) -> list[ScatterFinding]:
         and (item := effect.find_scatter(regression if effect.rounds else before)) is not None
     ]
     return sorted(found, key=lambda item: -item.bic_gain)
+
+
+def _directed(signals: Signals) -> NDArray[np.int64]:
+    """Readings but those at a turning point: which way the joint went there is not known.
+
+    One that hardly moves has none to speak of, and all of its readings count.
+    """
+    turning = ~signals.segment_first[signals.segment] & (signals.travel == 0.0)
+    return np.arange(len(signals)) if 2 * turning.sum() > turning.size else np.flatnonzero(~turning)
 
 
 def _subsample(n: int) -> NDArray[np.int64]:

@@ -19,7 +19,6 @@ from typing import Final
 import numpy as np
 
 from ..errors import ArgumentError
-from ..joint.signals import motion_of
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from ..support.suggestions import did_you_mean
@@ -73,29 +72,28 @@ class Nuisance:
         if self.slope:
             angle = run.unwrapped_reference
             error += self.slope * (angle - angle.mean())
-        if self.half_width or self.delay:
-            way, speed = motion_of(run)
-            error += self.half_width * way + self.delay * (0.0 if speed is None else speed)
+        if self.half_width:
+            error += self.half_width * run.direction
+        if self.delay and (speed := run.speed) is not None:
+            error += self.delay * speed
         return error
 
     def sentences(self, period: float) -> Iterable[str]:
         """What was taken out, for the notes."""
-        scale = 1_296_000.0 / period
-        turned = [f"order {k:g}: {scale * size:.3g} arcsec" for k, size, _ in self.turned]
         words = {
             "ramp": f"a ramp of {1e6 * self.slope:.3g} ppm of the angle (a wrong scale or ratio)",
-            "direction": f"a reversal error of +-{scale * abs(self.half_width):.3g} "
+            "direction": f"a reversal error of +-{1_296_000.0 * abs(self.half_width) / period:.3g} "
             "arcsec with the direction",
             "velocity": f"an error of {1e3 * self.delay:.3g} ms times the velocity (a delay)",
             "drift": f"a drift in time (cubic spline of {self.intervals} "
             f"interval{'s' if self.intervals > 1 else ''} in every run)",
             "reference": f"{len(self.reference)} lines of the reference",
             "turned": "lines of the reference with a new phase in every run, "
-            f"because its zero changes ({', '.join(turned)})",
+            f"because its zero changes ({', '.join(self._told(period))})",
         }
         shares = dict(self.shares)
         for kind in self.kinds:
-            gain = f", {100.0 * shares[kind]:.0f} % of the held-out error" if kind in shares else ""
+            gain = f", {100.0 * shares[kind]:.2g} % of the held-out error" if kind in shares else ""
             yield f"fitted jointly with the pattern, and not in the model: {words[kind]}{gain}"
         for kind in self.unseparated:
             yield (
@@ -103,6 +101,10 @@ class Nuisance:
                 "separate it from the pattern: run `ta.diagnose(...)`, or measure in both "
                 "directions, at several speeds and over more turns"
             )
+
+    def _told(self, period: float) -> Iterable[str]:
+        for order, amplitude, _ in self.turned:
+            yield f"order {order:g}: {1_296_000.0 * amplitude / period:.3g} arcsec"
 
 
 def asked_nuisance(asked: str | Iterable[str]) -> tuple[str, ...] | None:

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from ..joint.signals import motion_of
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from .nuisance import KINDS, Nuisance
@@ -32,18 +31,19 @@ def nuisance_columns(
     """Pattern, nuisances and errors of every ``stride``-th reading; ``kinds`` of None are all."""
     wanted = KINDS if kinds is None else kinds
     timed = all(run.time is not None and np.ptp(run.time) > 0.0 for run in runs)
-    motions = [motion_of(run) for run in runs] if {"direction", "velocity"} & {*wanted} else []
+    speeds = [run.speed for run in runs] if "velocity" in wanted else []
     parts: dict[str, list[Array]] = {}
     patterns, errors, folds = [], [], []
     for i, run in enumerate(runs):
         take = slice(None, None, stride)
         x = (2.0 * np.pi / run.period * getattr(run, argument))[take, None]
         angular = x * np.asarray(orders)
+        weight = np.ones(len(run)) if run.weights is None else run.weights
         mine = {"ramp": run.unwrapped_reference[take, None]} if "ramp" in wanted else {}
         if "direction" in wanted:
-            mine["direction"] = motions[i][0][take, None]
-        if "velocity" in wanted and all(speed is not None for _, speed in motions):
-            mine["velocity"] = np.asarray(motions[i][1])[take, None]
+            mine["direction"] = run.direction[take, None]
+        if speeds and all(speed is not None for speed in speeds):
+            mine["velocity"] = np.asarray(speeds[i])[take, None]
         if reference_orders:
             lines = (2.0 * np.pi / run.period * run.reference)[take, None] * reference_orders
             both = np.stack([np.cos(lines), np.sin(lines)], 2).reshape(len(x), -1)
@@ -56,7 +56,7 @@ def nuisance_columns(
             for count in (1, 2, 4, 6):
                 own = time_spline(run.time[take], run.time, count)
                 mine[f"drift{count}"] = _of_run(own, i, len(runs))
-        used = (np.ones(len(run)) if run.weights is None else run.weights)[take]
+        used = weight[take]
         for name, columns in mine.items():
             parts.setdefault(name, []).append(_about(columns, used))
         patterns.append(_about(np.hstack([np.cos(angular), np.sin(angular)]), used))

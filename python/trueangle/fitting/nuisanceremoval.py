@@ -13,7 +13,6 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders, shaft_cycles
-from ..joint.signals import join_runs
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from .nuisance import KINDS, Nuisance
@@ -106,7 +105,8 @@ def take_out_nuisance(
         missing = [k for k in kinds if not any(name.startswith(k) for name in rows.groups)]
         if missing:
             raise ArgumentError(_MISSING[missing[0]])
-        chosen = [*forced, *(name for name in rows.groups if name in kinds)]
+        named = [name for name in rows.groups if name in kinds]
+        chosen = [*forced, *named]
         if "drift" in kinds:
             chosen.append(best_spline(rows, chosen))
     if not chosen:
@@ -161,16 +161,14 @@ def _without(
     run: CalibrationRun, index: int, nuisance: Nuisance, drifts: Array | None
 ) -> CalibrationRun:
     error = nuisance.predict(run)
-    turned = ((k, c * np.sin(p[index]), c * np.cos(p[index])) for k, c, p in nuisance.turned)
-    for order, a, b in (*nuisance.reference, *turned):
+    for order, a, b in nuisance.reference:
         x = 2.0 * np.pi * order / run.period * run.reference
         error += a * np.cos(x) + b * np.sin(x)
+    for order, amplitude, phases in nuisance.turned:
+        x = 2.0 * np.pi * order / run.period * run.reference
+        error += amplitude * np.sin(x + phases[index])
     if drifts is not None and run.time is not None:
-        mine = drifts.reshape(-1, nuisance.intervals + 2)[index]
+        width = nuisance.intervals + 2
+        mine = drifts[index * width : (index + 1) * width]
         error += time_spline(run.time, run.time, nuisance.intervals) @ mine
-    weights = run.weights
-    if nuisance.half_width or nuisance.delay:
-        # Which way the joint went at a turning point is unknown: as a diagnosis, none takes part.
-        directed = np.isin(np.arange(len(run)), join_runs([run]).directed)
-        weights = np.where(directed, 1.0 if weights is None else weights, 0.0)
-    return replace(run, indicated=run.indicated - error, weights=weights)
+    return replace(run, indicated=run.indicated - error)

@@ -312,15 +312,6 @@ class Signals:
         reached = d * start[self.segment] + self.travel / half_width_deg
         return np.asarray(d * np.minimum(reached, 1.0))
 
-    @property
-    def directed(self) -> Index:
-        """Readings but those at a turning point: which way the joint went there is not known.
-
-        One that hardly moves has none to speak of, and all of its readings count.
-        """
-        turning = ~self.segment_first[self.segment] & (self.travel == 0.0)
-        return np.flatnonzero(~turning | (2 * turning.sum() > turning.size))
-
 
 def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     """Signals of ``runs``; a quantity that some run lacks is None for all."""
@@ -371,6 +362,15 @@ def _clock(run: CalibrationRun) -> Array:
     return np.asarray(run.time - run.time[0])
 
 
+def _velocity(run: CalibrationRun, direction: Array) -> Array | None:
+    speed = run.speed
+    if speed is None:
+        return None
+    if run.velocity is None and run.time is not None:
+        speed = velocity_at_turns(run.unwrapped_reference, run.time, direction, speed)
+    return np.asarray(speed * (360.0 / run.period))
+
+
 def _coupled(runs: Sequence[CalibrationRun]) -> dict[str, Array]:
     """Angles of the other joints that every run recorded, in degrees."""
     return {
@@ -382,66 +382,54 @@ def _coupled(runs: Sequence[CalibrationRun]) -> dict[str, Array]:
     }
 
 
-def _scaled(values: Array | None, factor: float) -> Array | None:
-    return None if values is None else values * factor
+def _mount(run: CalibrationRun, direction: Array) -> Array | None:
+    return None if run.mount is None else run.mount * (2.0 * math.pi / run.period)
 
 
 #: How each signal that runs may record is read from one of them and its direction of travel.
 RECORDED: dict[str, Callable[[CalibrationRun, Array], Array | None]] = {
-    "velocity": lambda run, way: _scaled(_speed(run, way), 360.0 / run.period),
+    "velocity": _velocity,
     "time": lambda run, _: run.time,
     "temperature": lambda run, _: run.temperature,
     "torque": lambda run, _: run.torque,
-    "mount": lambda run, _: _scaled(run.mount, 2.0 * math.pi / run.period),
+    "mount": _mount,
     "current": lambda run, _: run.signals.get("current"),
 }
 
 
-def motion_of(run: CalibrationRun) -> tuple[Array, Array | None]:
-    """Direction and velocity of every reading, those next to turning points from their own side.
-
-    In the unit of the run; velocities are None without times.
-    """
-    way = _direction(run)
-    return way, _speed(run, way)
-
-
-def _speed(run: CalibrationRun, direction: Array) -> Array | None:
-    speed = run.speed
-    if speed is None or run.velocity is not None or run.time is None:
-        return speed
-    return velocity_at_turns(run.unwrapped_reference, run.time, direction, speed)
-
-
-def _direction(run: CalibrationRun) -> Array:
-    angle, direction = run.unwrapped_reference, run.direction
+def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
+    """Direction, travel, segment of every reading; direction and length of every segment."""
+    angle = run.unwrapped_reference * (360.0 / run.period)
+    direction = run.direction
     steps = np.diff(angle)
     if not direction.any() and steps.any():
         # At rest at every reading: the direction is that of the approach.
         sign = np.sign(np.concatenate([steps[:1], steps]))
-        last = np.where(sign != 0.0, np.arange(sign.size), np.flatnonzero(sign)[0])
-        direction = sign[np.maximum.accumulate(last)]
+        last = np.maximum.accumulate(
+            np.where(sign != 0.0, np.arange(sign.size), np.flatnonzero(sign)[0])
+        )
+        direction = sign[last]
     # Of more sign changes between neighbouring steps the direction is read with a dead zone: a
     # reference at rest flickers by a count, a moving one does not; ten are taken as they are.
     if np.count_nonzero(np.diff(direction)) > max(0.05 * len(run), REVERSALS_TRUSTED):
-        return _dead_zone_direction(angle)
-    if run.velocity is None and "direction" not in run.signals:
-        return direction_at_turns(angle, _clock(run), direction)
-    return direction
-
-
-def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
-    """Direction, travel, segment of every reading; direction and length of every segment."""
-    angle, direction = run.unwrapped_reference * (360.0 / run.period), _direction(run)
-    edges = np.array(_edges(direction))
+        direction = _dead_zone_direction(angle)
+    elif run.velocity is None and "direction" not in run.signals:
+        direction = direction_at_turns(angle, _clock(run), direction)
+    cuts = np.flatnonzero(np.diff(direction)) + 1
+    edges = np.concatenate([[0], cuts, [len(run)]])
     segment = np.repeat(np.arange(edges.size - 1), np.diff(edges))
     # A segment starts at the turning point: the farther of the readings on both sides.
     before, after = angle[np.maximum(edges[:-1] - 1, 0)], angle[edges[:-1]]
     old = np.concatenate([direction[:1], direction[edges[:-2]]])
     origin = np.where((after - before) * old > 0.0, after, before)
     end = np.concatenate([origin[1:], angle[-1:]])
-    travel, length = np.abs(angle - origin[segment]), np.abs(end - origin)
-    return direction, travel, segment, direction[edges[:-1]], length
+    return (
+        direction,
+        np.abs(angle - origin[segment]),
+        segment,
+        direction[edges[:-1]],
+        np.abs(end - origin),
+    )
 
 
 def _dead_zone_direction(angle: Array) -> Array:

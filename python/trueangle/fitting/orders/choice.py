@@ -44,7 +44,7 @@ def selected_orders(
 ) -> OrderSelection:
     """As `trueangle.select_orders`; with ``summed`` of all readings of which the runs are some."""
     check_choice("method", method, ("evidence", "paper"))
-    kept = _with_weight(found)
+    kept = [run for run in map(_without_zero_weights, found) if run is not None]
     if not kept:
         raise ArgumentError("all readings have weight 0; give positive weights")
     said: tuple[str, ...] = ()
@@ -65,7 +65,7 @@ def selected_orders(
         if lines and not taken.turned:
             # Lines that are the same in every run stay, to be fitted and named.
             cleaned, taken = take_out_nuisance(kept, kinds, likely, angle)
-        kept, said = _with_weight(cleaned), tuple(taken.sentences(kept[0].period))
+        kept, said = cleaned, tuple(taken.sentences(kept[0].period))
     choice = choose_argument(kept, argument)
     if choice.argument == "indicated":
         kept = [run_at_indicated(run) for run in kept]
@@ -93,10 +93,11 @@ def selected_orders(
     return replace(selection, argument=choice.argument, notes=notes, shafts=dict(shafts or {}))
 
 
-def _with_weight(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
-    """The readings that have a weight, of the runs that have some."""
-    each = [(run, np.ones(len(run)) if run.weights is None else run.weights) for run in runs]
-    return [run if (w > 0.0).all() else run.part(w > 0.0) for run, w in each if w.any()]
+def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
+    if run.weights is None or (run.weights > 0.0).all():
+        return run
+    keep = run.weights > 0.0
+    return run.part(keep) if keep.any() else None
 
 
 def _travelled(
