@@ -164,12 +164,9 @@ def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator
         return
     sizes = _hats(knots_of(np.abs(x)))
 
-    def bent(x: Array) -> Array:
-        return np.column_stack([x, np.abs(x), x * np.abs(x) / top, x * x / top]) * (1.0 / top)
-
-    def rooted(x: Array) -> Array:
-        # With a step at rest: what falls from there is none of the direction.
-        return np.column_stack([np.sign(x) * (np.abs(x) / top) ** p for p in (0.0, 0.5, 1.0)])
+    def bent(x: Array, power: float = 2.0) -> Array:
+        signs = np.column_stack([np.sign(x), np.ones_like(x)])
+        return np.hstack([signs * (np.abs(x)[:, None] / top) ** p for p in (1.0, power)])
 
     def even(x: Array) -> Array:
         return sizes(np.abs(x))
@@ -180,9 +177,9 @@ def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator
 
     parts = [even, odd] if float(x.min()) < 0.0 < float(x.max()) else [even]
     # Of few levels these have no more columns.
-    products = parts if even(x[:1]).shape[1] <= FEW else [bent]
-    yield Axis(factor, x, rooted, grid, unit)
-    yield Axis(factor, x, bent, grid, unit, *products)
+    is_few = even(x[:1]).shape[1] <= FEW
+    yield Axis(factor, x, lambda x: bent(x, 0.5), grid, unit)
+    yield Axis(factor, x, bent, grid, unit, *(parts if is_few else [bent]))
     yield Axis(factor, x, lambda x: np.hstack([part(x) for part in parts]), grid, unit)
 
 

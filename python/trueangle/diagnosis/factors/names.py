@@ -169,25 +169,20 @@ class NamedForms:
         return mine, self.account.variance(beside, [k for k in free if not given[k]])
 
     def same(self, name: int) -> list[str]:
-        """Factors whose functions are columns of a finding in this design, or hold these.
-
-        Speed at one speed is the direction, and has its step at any speed.
-        """
+        """Factors whose functions are columns of a finding in this design: speed at one speed."""
         groups = self.account.groups
-        own = _centred(groups[self.places[name]].columns)
-        every = ((groups[k].factor, _centred(groups[k].columns)) for k in self.free)
-        return [f for f, other in every if _holds(own, other) or _holds(other, own)]
+        basis = orthonormal_basis(_centred(groups[self.places[name]].columns))
+        found = []
+        for k in self.free:
+            columns = _centred(groups[k].columns)
+            left = columns - basis @ (basis.T @ columns)
+            if np.abs(left).max() <= _SAME * np.abs(columns).max(initial=0.0):
+                found.append(groups[k].factor)
+        return found
 
     def is_of(self, k: int, factors: Sequence[str]) -> bool:
         """A group is of one of the factors."""
         return self.account.groups[k].factor in factors
-
-
-def _holds(columns: Array, others: Array) -> bool:
-    """Whether others are within the span of columns."""
-    basis = orthonormal_basis(columns)
-    left = others - basis @ (basis.T @ others)
-    return bool(np.abs(left).max() <= _SAME * np.abs(others).max(initial=0.0))
 
 
 def _centred(columns: Array) -> Array:
