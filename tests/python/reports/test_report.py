@@ -93,7 +93,7 @@ def test_one_run_has_no_gain_and_says_so(runs) -> None:
     assert made.content["gain"] is None
     assert "One run only" in made.content["why_no_gain"]
     assert "Not verified" in made.html
-    assert any("run to run" in e["what"] for e in made.content["unknowns"])
+    assert any("differences between runs" in e["what"] for e in made.content["unknowns"])
 
 
 def test_a_reversed_sensor_is_stated_with_the_model(runs) -> None:

@@ -278,11 +278,11 @@ def test_what_can_and_cannot_be_known() -> None:
         ({"span_deg": 349.9}, "over a whole turn: 350 deg of travel"),
         ({"directions": (1,)}, "reversal error: one direction"),
         ({"timed": False}, "delay, drift and lines in time: no time stamps"),
-        ({"speeds": (1.0,)}, "delay apart from reversal error or zero: one speed"),
+        ({"speeds": (1.0,)}, "a delay, separately from play and from a zero offset: one speed"),
         ({"loads": (1.0,)}, "compliance: one torque"),
         ({"temperatures": ()}, "thermal drift: no temperature"),
         ({"mounts": (1.0,)}, "the reference's own error apart from the joint's: one mount"),
-        ({"runs": 2}, "what changes from run to run: 2 runs"),
+        ({"runs": 2}, "differences between runs: 2 runs"),
     ):
         fewer, cannot = told(**changes)
         assert len(fewer) == 7
