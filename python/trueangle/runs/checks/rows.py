@@ -77,8 +77,7 @@ def without_old_samples(runs: Sequence[CalibrationRun]) -> tuple[list[Calibratio
     kept, told = [], []
     for run, record in zip(runs, records_of(runs), strict=True):
         if old := [f for f in stuck_readings([record]) if f.fault == "stale_samples"]:
-            rows = np.delete(np.arange(len(run)), [row - 1 for f in old for row in f.rows])
-            run = run.part(rows)
+            run = run.part(np.delete(np.arange(len(run)), [r - 1 for f in old for r in f.rows]))
             told += [f"{fault.says}; they are omitted" for fault in old]
         kept.append(run)
     return kept, told

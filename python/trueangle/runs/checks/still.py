@@ -102,9 +102,10 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
     times = 0
     passed = np.abs(other[last] - other[first])
     long = last - first >= _LEAST_STUCK
+    ends = own.min(), own.max()
     for i in np.flatnonzero((passed >= channels.least) | long).tolist():
         a, b = int(first[i]), int(last[i])
-        if own[a] in (own.min(), own.max()) and long[i] and _is_limit(channels, a, b):
+        if own[a] in ends and long[i] and _is_limit(channels, a, b):
             limit += range(a + 1, b + 1)
         elif passed[i] >= channels.least and _is_stale(channels, a, b):
             stale += range(a + 1, b + 1)
