@@ -34,14 +34,13 @@ from .findings import equal_scatter, scatter_doubt, scatter_finding
 from .gates import many_causes, not_the_only_ratio
 from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
-from .judgedbeliefs import judged_beliefs
+from .judgedbeliefs import judged_beliefs, misplaced_beliefs
 from .naming import named_causes
 from .penalty import regression_without
 from .remainder import leftover_of
 from .result import Diagnosis
 from .rounding import rounding_of
 from .unseenorders import arc_note
-from .wrongplace import misplaced_beliefs
 
 if TYPE_CHECKING:
     from ..runs.joining import MeasuredMinusSimulated

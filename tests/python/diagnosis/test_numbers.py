@@ -21,10 +21,10 @@ from trueangle.diagnosis.gain import _exchanged, _level
 from trueangle.diagnosis.gearedlines import PLAIN, GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
+from trueangle.diagnosis.judgedbeliefs import misplaced_beliefs
 from trueangle.diagnosis.overlap import finding_overlaps
 from trueangle.diagnosis.remainder import share_of_run
 from trueangle.diagnosis.rivals import rivals_of
-from trueangle.diagnosis.wrongplace import misplaced_beliefs
 from trueangle.effects import EFFECTS, LocalDefect
 from trueangle.effects.ambiguity import Ambiguity
 from trueangle.estimation.quantity import quantity
