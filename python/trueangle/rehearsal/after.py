@@ -110,7 +110,7 @@ def plan_after(
     >>> runs = simulate(sim.with_effects([Backlash(3.0)]))
     >>> plan = plan_after(runs, sim, between=["backlash", "latency"], seeds=2)
     >>> plan.runs[0].speed_deg_s, plan.between[0].told
-    (60.0, False)
+    (60.0, True)
     """
     of_type("sim", sim, Simulation, "a trueangle.Simulation (trueangle.load_simulation reads one)")
     names = None if between is None else list(dict.fromkeys(between))

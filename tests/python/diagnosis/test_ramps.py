@@ -8,6 +8,8 @@ import pytest
 import trueangle as ta
 from trueangle.simulation import Simulation
 
+from .factors.test_factors import confirmed
+
 SIGMA = 0.9
 
 SEEDS = [70_511, 70_513]
@@ -44,10 +46,6 @@ def warming(law, rng, spread=0.0):
     return runs
 
 
-def confirmed(result):
-    return [finding.cause for finding in result.findings if finding.confirmed]
-
-
 def said(result, *causes):
     """One open question names all of these."""
     return any(spot.supported and {*causes} <= {*spot.causes} for spot in result.not_identifiable)
@@ -56,7 +54,6 @@ def said(result, *causes):
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("size", [0.09, 0.35])
 def test_gravity_on_an_arc_is_no_ratio(size, seed):
-    print(f"seed {seed}")
     rng = np.random.default_rng(seed)
     result = ta.diagnose(on_an_arc(lambda _, torque: 4.0 * size * torque, rng), Simulation())
     assert confirmed(result) == []
@@ -70,7 +67,6 @@ def test_gravity_on_an_arc_is_no_ratio(size, seed):
 @pytest.mark.parametrize("size", [0.7, 5.0])
 @pytest.mark.parametrize("made_by", ["temperature", "angle"])
 def test_a_temperature_that_runs_with_the_angle(made_by, size, seed):
-    print(f"seed {seed}")
     rng = np.random.default_rng(seed)
 
     def law(turned, temperature):
@@ -83,7 +79,6 @@ def test_a_temperature_that_runs_with_the_angle(made_by, size, seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_ramp_under_temperatures_that_do_not_is_one(seed):
-    print(f"seed {seed}")
     rng = np.random.default_rng(seed)
     result = ta.diagnose(warming(lambda turned, _: turned / 40.0, rng, 4.0), Simulation())
     assert confirmed(result) == ["scale_error"]
@@ -97,7 +92,6 @@ def test_a_ramp_under_temperatures_that_do_not_is_one(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_ratio_on_an_arc_under_a_load_that_bends_is_one(seed):
     """Over a wider arc the moment of the weight is no ramp any more."""
-    print(f"seed {seed}")
     rng = np.random.default_rng(seed)
     result = ta.diagnose(on_an_arc(lambda turned, _: 0.6 * turned, rng), Simulation())
     assert confirmed(result) == ["scale_error"]

@@ -58,9 +58,12 @@ HELD: Final = 1e-7
 
 
 def _prior(groups: Sequence[Group]) -> list[float]:
-    """Of each group: one of them is expected, and the strongest of many counts as one."""
+    """Of each group: one of them is expected, and the strongest of many counts as one.
+
+    What holds the functions of two factors is as probable as both.
+    """
     each = 1.0 / max(len(groups), 2)
-    return [0.0 if group.factor == NAME else each / group.alternatives for group in groups]
+    return [0.0 if g.factor == NAME else each**g.factors / g.alternatives for g in groups]
 
 
 @dataclass(frozen=True, eq=False)

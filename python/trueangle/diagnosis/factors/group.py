@@ -88,6 +88,8 @@ class Group:
         Run and row of what happened once, which no other run will show.
     jump : float or None
         Where a ramp over a turn falls back, degrees.
+    factors : int
+        Number of factors whose functions it holds.
     """
 
     factor: str
@@ -99,6 +101,7 @@ class Group:
     alternatives: float = 1.0
     event: tuple[str, int] | None = None
     jump: float | None = None
+    factors: int = 1
 
     @cached_property
     def values(self) -> Array:

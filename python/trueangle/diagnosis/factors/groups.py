@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -39,18 +39,25 @@ KNOTS: Final = 8
 MOST_RUNS: Final = 24
 
 
+@dataclass(frozen=True, eq=False)
 class Axis:
-    """A factor: its values at the readings, functions of them, and those of products with lines."""
+    """A factor: its values at the readings, functions of them, and those of products with lines.
 
-    def __init__(
-        self, factor: str, x: Array, basis: Basis, at: Array, unit: str, *products: Basis
-    ) -> None:
-        self.factor, self.x, self.basis, self.at, self.unit = factor, x, basis, at, unit
-        self.products = products
+    The functions may be those of other ``factors``, too.
+    """
+
+    factor: str
+    x: Array
+    basis: Basis
+    at: Array
+    unit: str
+    products: Sequence[Basis] = ()
+    factors: int = 1
 
     def alone(self) -> Group:
         """Its function."""
-        return Group.of_function(self.factor, self.x, self.basis, self.at, self.unit)
+        group = Group.of_function(self.factor, self.x, self.basis, self.at, self.unit)
+        return replace(group, factors=self.factors)
 
     def times(self, theta: Array, order: float, basis: Basis) -> Group:
         """Products with a line less their means: a line of the place is a group of its own."""
@@ -126,7 +133,7 @@ def _axes(signals: Signals) -> Iterator[Axis]:
     """Factors that change."""
     d = signals.direction
     if bool((d > 0.0).any() and (d < 0.0).any()):
-        yield Axis("direction", d, _column, np.array([-1.0, 1.0]), "sign", _column)
+        yield Axis("direction", d, _column, np.array([-1.0, 1.0]), "sign", [_column])
         yield from _reversals(signals)
     yield from _signed("speed", signals.velocity, 2.0 * SPEED_CHANGES, "deg/s")
     tau = signals.torque
@@ -147,7 +154,7 @@ def _axes(signals: Signals) -> Iterator[Axis]:
 
         any_one = _hats(knots)
         product = any_one if any_one(knots).shape[1] <= FEW else warm
-        yield Axis("temperature", kelvin, warm, grid, "C", product)
+        yield Axis("temperature", kelvin, warm, grid, "C", [product])
         yield Axis("temperature", kelvin, any_one, grid, "C")
     yield from _signed("current", signals.current, LOAD_CHANGES, "A")
     yield from _clock(signals)
@@ -160,13 +167,16 @@ def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator
         return
     grid = grid_of(knots_of(x))
     if float(np.std(np.abs(x))) < ONE_SIZE * top:
-        yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit, _column)
+        yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit, [_column])
         return
     sizes = _hats(knots_of(np.abs(x)))
 
     def bent(x: Array, power: float = 2.0) -> Array:
         signs = np.column_stack([np.sign(x), np.ones_like(x)])
         return np.hstack([signs * (np.abs(x)[:, None] / top) ** p for p in (1.0, power)])
+
+    def from_rest(x: Array) -> Array:
+        return np.hstack([np.sign(x)[:, None], bent(x, 0.5)[:, ::2]])
 
     def even(x: Array) -> Array:
         return sizes(np.abs(x))
@@ -177,10 +187,13 @@ def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator
 
     parts = [even, odd] if float(x.min()) < 0.0 < float(x.max()) else [even]
     # Of few levels these have no more columns.
-    is_few = even(x[:1]).shape[1] <= FEW
+    products = parts if even(x[:1]).shape[1] <= FEW else [bent]
     yield Axis(factor, x, lambda x: bent(x, 0.5), grid, unit)
-    yield Axis(factor, x, bent, grid, unit, *(parts if is_few else [bent]))
-    yield Axis(factor, x, lambda x: np.hstack([part(x) for part in parts]), grid, unit)
+    yield Axis(factor, x, bent, grid, unit, products)
+    # With a step at rest they are functions of the sign, too.
+    of_both = [lambda x: np.hstack([part(x) for part in parts]), from_rest]
+    for basis in of_both[: len(parts)]:
+        yield Axis(factor, x, basis, grid, unit, (), len(parts))
 
 
 def knots_of(x: Array) -> Array:
@@ -230,9 +243,11 @@ def _reversals(signals: Signals) -> Iterator[Axis]:
     for x, unit, end in ways:
         if x is None:
             continue
-        whole = float(np.median(_longest(signals, x)))
-        if not whole > 0.0:
+        longest = np.zeros(signals.segment_direction.size)
+        np.maximum.at(longest, signals.segment, x)
+        if not longest.any():
             continue
+        whole = float(np.median(longest[longest > 0.0]))
         lengths = np.array(LENGTHS) * whole
 
         def settles(x: Array, lengths: Array = lengths, end: float = end) -> Array:
@@ -264,12 +279,6 @@ def _since(signals: Signals) -> Array | None:
     order = np.arange(len(signals))[::-1]
     first[signals.segment[order]] = signals.clock[order]
     return np.asarray(signals.clock - first[signals.segment])
-
-
-def _longest(signals: Signals, x: Array) -> Array:
-    longest = np.zeros(signals.segment_direction.size)
-    np.maximum.at(longest, signals.segment, x)
-    return np.asarray(longest[longest > 0.0] if (longest > 0.0).any() else longest)
 
 
 def _clock(signals: Signals) -> Iterator[Axis]:

@@ -432,6 +432,10 @@ FORMS = {
         "place",
         pattern(lambda x, d, v, t, r: 9.0 * ((30.0 * x + 0.2) % 1.0 < 0.3)),
     ),
+    "falls with the speed": (
+        "speed",
+        lambda rng: measured(rng, lambda x, d, v, *_: 7 * d * np.exp(-v / 12), (3, 6, 12, 30, 55)),
+    ),
     "root of the speed": ("speed", pattern(lambda x, d, v, t, r: 1.5 * d * np.sqrt(v))),
     "a cam under load": (
         "load_place",
@@ -447,12 +451,13 @@ FORMS = {
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_form_without_a_name_is_stated_by_its_factor_and_gets_none(rng, form):
-    """They had been named: rows of bumps and orders, play, springs, drifts of the runs."""
+    """They had been named: rows of bumps and orders, play, springs, or two factors that cancel."""
     factor, runs = FORMS[form]
     joint = Joint(30.0, "none") if "pole" in form else EMPTY.joint
     found = ta.diagnose(runs(rng), Simulation(joint, sigma_arcsec=NOISE))
     assert confirmed(found) == []
     assert found.factors[0].factor == factor
+    assert found.factors[0].rms < found.discrepancy.rms
     if form == "slips":
         assert len(found.factors[0].events) == 4
 
